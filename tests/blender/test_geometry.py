@@ -136,3 +136,79 @@ class AddOn(Case):
         self.assertEqual(done, {"FINISHED"})
         with open(os.path.join(folder, "report.txt"), encoding="utf-8") as file:
             self.assertIn("p: sheen: none", file.read())
+
+    def test_text_and_curves_are_placed_once(self):
+        scene = stage.fresh()
+        text = bpy.data.curves.new("words", "FONT")
+        text.body, text.extrude = "tw", 0.1
+        stage.place("words", text)
+        kept = bpy.data.collections.new("kept")
+        kept.objects.link(bpy.data.objects.new("inside", text))
+        empty = stage.place("collection", None, (0.0, 5.0, 0.0))
+        empty.instance_type, empty.instance_collection = "COLLECTION", kept
+        ring = bpy.data.curves.new("ring", "CURVE")
+        ring.dimensions, ring.bevel_depth = "3D", 0.1
+        ring.splines.new("POLY").points.add(3)
+        for point, at in zip(ring.splines[0].points, [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 1)]):
+            point.co = (*at, 1.0)
+        stage.place("ring", ring)
+        drop = bpy.data.metaballs.new("drop")
+        drop.elements.new()
+        stage.place("drop", drop)
+        found, _, folder = export("curves")
+        self.assertEqual(sorted(mesh["name"] for mesh in found["mesh"]), ["drop", "inside", "ring", "words"])
+        for mesh in found["mesh"]:
+            self.assertGreater(len(ply(os.path.join(folder, mesh["file"]))[2]), 10)
+
+    def test_values_are_those_of_the_first_frame_wherever_the_file_stands(self):
+        scene = stage.fresh(frames=9)
+        material = stage.diffuse("changing", (1.0, 0.0, 0.0))
+        colour = material.node_tree.nodes["Diffuse BSDF"].inputs["Color"]
+        block = stage.place("vanishing", stage.cube(material=material))
+        for frame, value, hidden in ((1, (0.0, 0.0, 1.0, 1.0), False), (9, (1.0, 0.0, 0.0, 1.0), True)):
+            colour.default_value, block.hide_render = value, hidden
+            colour.keyframe_insert("default_value", frame=frame)
+            block.keyframe_insert("hide_render", frame=frame)
+            scene.view_settings.exposure = float(frame - 1)
+            scene.keyframe_insert("view_settings.exposure", frame=frame)
+        scene.frame_set(9)
+        found, lines, _ = export("changing")
+        self.near(found["material"]["changing"]["diffuse"], [0.0, 0.0, 1.0])
+        self.assertNotIn("exposure", found["settings"])
+        self.noted(lines, "changing", "animated", "frame 1")
+        self.noted(lines, "vanishing", "disappears")
+        self.noted(lines, "Scene", "animated settings")
+        self.assertEqual(scene.frame_current, 9)
+
+    def test_materials_of_libraries_are_told_from_those_of_the_same_name(self):
+        stage.fresh()
+        library = os.path.join(FOLDER, "library.blend")
+        block = stage.place("linked", stage.cube(material=stage.diffuse("paint", (1.0, 0.0, 0.0))))
+        bpy.data.libraries.write(library, {block})
+        scene = stage.fresh()
+        stage.place("own", stage.cube(material=stage.diffuse("paint", (0.0, 0.0, 1.0))))
+        with bpy.data.libraries.load(library, link=True) as (inside, loaded):
+            loaded.objects = ["linked"]
+        scene.collection.objects.link(loaded.objects[0])
+        found, _, _ = export("library")
+        for name, colour in (("own", [0.0, 0.0, 1.0]), ("linked", [1.0, 0.0, 0.0])):
+            [mesh] = meshes(found, name)
+            self.near(found["material"][mesh["material"]]["diffuse"], colour)
+
+    def test_what_the_scene_has_and_tweenray_has_not_is_noted(self):
+        scene = stage.fresh(100, 300)
+        render, layer = scene.render, scene.view_layers[0]
+        render.resolution_percentage, render.film_transparent, render.use_freestyle = 29, True, True
+        scene.cycles.diffuse_bounces = 4
+        scene.world.cycles_visibility.camera = False
+        scene.camera.data.clip_start, scene.camera.data.clip_end = 8.0, 9.0
+        layer.material_override = stage.diffuse("all", (1, 1, 1))
+        kept = bpy.data.collections.new("cut out")
+        scene.collection.children.link(kept)
+        layer.layer_collection.children["cut out"].holdout = True
+        stage.place("floor", stage.plane())
+        found, lines, _ = export("settings")
+        self.assertEqual(found["settings"]["size"], [29, 87])
+        for words in (("transparent film",), ("Freestyle",), ("surface to surface",), ("invisible to the camera",), ("clip start 8",), ("clip end 9",), ("material override",), ("cut out", "holdout")):
+            self.noted(lines, *words)
+        self.assertTrue(render.use_freestyle)

@@ -62,6 +62,17 @@ class Lights(Case):
         found, _ = self.one("POINT", energy=0.0)
         self.assertNotIn("light", found)
 
+    def test_portals_and_what_light_passes_through(self):
+        stage.fresh()
+        stage.light("window", "AREA", (0.0, 0.0, 3.0), energy=50.0).data.cycles.is_portal = True
+        softbox = stage.light("softbox", "AREA", (0.0, 0.0, 3.0), energy=50.0)
+        softbox.visible_camera = softbox.visible_diffuse = False
+        found, lines, _ = export("portal")
+        self.assertEqual(len(found["light"]), 1)
+        self.noted(lines, "window", "portal")
+        self.noted(lines, "softbox", "passes through", "camera does not see", "hides")
+        self.noted(lines, "softbox", "diffuse rays")
+
     def test_a_background_and_images_of_the_sky(self):
         scene = stage.fresh()
         stage.background(scene, (0.1, 0.2, 0.4), 2.0)

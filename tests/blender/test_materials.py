@@ -229,3 +229,57 @@ class Materials(Case):
         columns, rows, _ = ply(os.path.join(folder, found["mesh"][0]["file"]))
         red = rows[:, columns.index("red")]
         self.near(sorted(red), [0.0, 0.537099, 0.735357, 1.0], 1e-4)
+
+    def test_group_sockets_of_one_name_are_told_apart(self):
+        def grouped():
+            tree = bpy.data.node_groups.new("group", "ShaderNodeTree")
+            for kind in ("INPUT", "INPUT", "OUTPUT"):
+                tree.interface.new_socket("Color", in_out=kind, socket_type="NodeSocketColor")
+            ends = tree.nodes.new("NodeGroupInput"), tree.nodes.new("NodeGroupOutput")
+            tree.links.new(ends[0].outputs[1], ends[1].inputs[0])
+            material = stage.diffuse("d", (1.0, 1.0, 1.0))
+            nodes = material.node_tree.nodes
+            group = nodes.new("ShaderNodeGroup")
+            group.node_tree = tree
+            group.inputs[0].default_value, group.inputs[1].default_value = (1.0, 0.0, 0.0, 1.0), (0.0, 1.0, 0.0, 1.0)
+            material.node_tree.links.new(group.outputs[0], nodes["Diffuse BSDF"].inputs["Color"])
+            return material
+
+        self.near(self.of(grouped)[0]["diffuse"], [0.0, 1.0, 0.0])
+
+    def test_alpha_counts_as_cycles_counts_it(self):
+        def painted(alpha_mode, is_cut=False):
+            def made():
+                image = bpy.data.images.new("half", 1, 1, alpha=True)
+                image.pixels[:] = [1.0, 1.0, 1.0, 0.5]
+                image.pack()
+                image.alpha_mode = alpha_mode
+                material = stage.principled("p")
+                nodes, links = material.node_tree.nodes, material.node_tree.links
+                texture = nodes.new("ShaderNodeTexImage")
+                texture.image = image
+                links.new(texture.outputs["Color"], nodes["Principled BSDF"].inputs["Base Color"])
+                if is_cut:
+                    links.new(texture.outputs["Alpha"], nodes["Principled BSDF"].inputs["Alpha"])
+                return material
+
+            return made
+
+        def shown(table):
+            file = table["principled"]["base_texture"]
+            return bpy.data.images.load(os.path.join(self.folder, file)).pixels[0]
+
+        # Its colour counts times its alpha where no node takes that.
+        self.near(shown(self.of(painted("STRAIGHT"))[0]), 0.5, 0.01)
+        table, _ = self.of(painted("STRAIGHT", True))
+        self.near(shown(table), 1.0, 0.01)
+        self.assertIn("alpha", table)
+        table, _ = self.of(painted("NONE", True))
+        self.near(shown(table), 1.0, 0.01)
+        self.assertNotIn("alpha", table)
+
+    def test_what_has_no_material_is_blenders_default(self):
+        stage.fresh()
+        stage.place("floor", stage.plane())
+        found, _, _ = export("default")
+        self.near(found["material"]["tweenray_default"]["principled"]["base_colour"], [0.8] * 3)

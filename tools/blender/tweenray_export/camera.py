@@ -7,7 +7,12 @@ projection matrix, so that sensor fit, shift and the shape of pixels are what Bl
 
 import math
 
+from mathutils import Vector
+
 from . import axes
+
+# A camera's own clip start, nearer than which nothing is that a picture should show.
+USUAL_START = 0.11
 
 
 def record(camera, depsgraph, size, report):
@@ -39,6 +44,24 @@ def record(camera, depsgraph, size, report):
         "pixel_aspect": half_width / half_height * height / width,
         "lens": lens,
     }
+
+
+class Clipping:
+    """Notes what the camera's clip distances would cut off in the first frame; tweenray has none."""
+
+    def __init__(self, camera, report):
+        place = camera.matrix_world.normalized()
+        self.eye, self.forward = place.translation, -place.col[2].xyz
+        self.name, self.report = camera.name, report
+        self.start, self.end = camera.data.clip_start, camera.data.clip_end
+
+    def note(self, ob, matrix):
+        """Notes it of an object at `matrix`, by its bounding box."""
+        corners = [(matrix @ Vector(corner) - self.eye).dot(self.forward) for corner in ob.bound_box]
+        if 0.0 < max(corners) and min(corners) < self.start and self.start > USUAL_START:
+            self.report.add(self.name, f"clip start {self.start:g}", "what is nearer is seen")
+        if max(corners) > self.end:
+            self.report.add(self.name, f"clip end {self.end:g}", "what is farther is seen")
 
 
 def thin_lens(data, eye, forward, depsgraph, report, name):

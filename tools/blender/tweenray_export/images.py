@@ -21,8 +21,10 @@ class Images:
         self.folder, self.report = folder, report
         self._files, self._names = {}, set()
 
-    def colour(self, image):
-        """The file of an image of colours, or None where it has no pixels."""
+    def colour(self, image, times_alpha=False):
+        """The file of an image of colours, `times_alpha` or as they are, or None where it has no pixels."""
+        if times_alpha and self._is_transparent(image):
+            return self._once(image, "premultiplied", lambda: self._premultiplied(image))
         space = image.colorspace_settings.name
         as_codes = space == "sRGB" and not image.is_float
         as_light = image.is_float and (space.startswith("Linear") or space == "Non-Color")
@@ -70,7 +72,8 @@ class Images:
         if key not in self._files:
             self._files[key] = make()
             if self._files[key] is None:
-                self.report.add(image.name, "the image has no pixels", "one colour")
+                what = {"SEQUENCE": "an image sequence", "MOVIE": "a movie"}.get(image.source, "the image has no pixels")
+                self.report.add(image.name, what, "one colour")
         return self._files[key]
 
     def _copy(self, image):
@@ -106,6 +109,18 @@ class Images:
     def _light(self, image):
         pixels = self._pixels(image)
         return None if pixels is None else self._exr(image.name, pixels)
+
+    def _is_transparent(self, image):
+        pixels = self._pixels(image) if image.channels == 4 else None
+        return pixels is not None and float(pixels[..., 3].min()) < 1.0
+
+    def _premultiplied(self, image):
+        """Linear colours times alpha. Blender's pixels are of straight alpha where they are codes."""
+        pixels = self._pixels(image)
+        if image.is_float:
+            return self._exr(image.name, pixels)
+        rgb = from_srgb(pixels[..., :3]) if image.colorspace_settings.name == "sRGB" else pixels[..., :3]
+        return self._exr(image.name, np.concatenate([rgb * pixels[..., 3:], pixels[..., 3:]], axis=2))
 
     def _linear_codes(self, image):
         pixels = self._pixels(image)

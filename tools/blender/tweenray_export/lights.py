@@ -73,8 +73,11 @@ def note(ob, light, report, name):
         report.add(name, "no shadows", "it casts shadows")
     if getattr(light, "use_soft_falloff", False) and light.type in ("POINT", "SPOT") and light.shadow_soft_size > 0.0:
         report.add(name, "soft falloff", "the falloff of a sphere, brighter nearby by 1 + (radius / distance)^2")
-    if light.type in ("AREA", "SUN") and not ob.visible_camera:
-        report.add(name, "invisible to the camera", "it is seen where the camera looks at its front")
+    if light.type == "AREA":
+        unseen = "" if ob.visible_camera else ", and the camera does not see it"
+        report.add(name, f"light passes through it{unseen}", "it is a surface: bright from its front, black from its back, and it hides and shades what is behind it")
+    if light.type == "SUN" and light.angle > 0.0 and not ob.visible_camera:
+        report.add(name, "a sun that is invisible to the camera", "its disk is seen in the sky")
     if light.type == "POINT" and light.shadow_soft_size > 0.0 and not ob.visible_camera and ob.visible_glossy:
         report.add(name, "invisible to the camera alone", "perfect mirrors and glass do not show it either")
 

@@ -1,7 +1,5 @@
 """Materials: Blender's shader nodes as `[material.NAME]` of a scene file."""
 
-import bpy
-
 from . import shaders
 from .nodes import Place, surface
 from .values import Reader
@@ -17,13 +15,9 @@ class Materials:
         self.images, self.report = images, report
         self._made = {}
 
-    def original(self, name):
-        """The material of that name."""
-        return bpy.data.materials.get(name)
-
     def made(self, material):
         """What a material is in tweenray: a `shaders.Made`."""
-        name = material.name if material else DEFAULT
+        name = material.name_full if material else DEFAULT
         if name not in self._made:
             self._made[name] = self._make(material, name)
         return self._made[name]
@@ -55,8 +49,9 @@ class Materials:
 
     def _make(self, material, name):
         if material is None or material.node_tree is None:
-            grey = list(material.diffuse_color)[:3] if material else [0.8] * 3
-            return shaders.Made({"diffuse": grey})
+            if material is None:
+                return shaders.Made({"principled": {"base_colour": [0.8] * 3, "roughness": 0.5, "ior": 1.5}})
+            return shaders.Made({"diffuse": list(material.diffuse_color)[:3]})
         places = surface(material.node_tree)
         if places is None:
             self.report.add(name, "no material output", "black")

@@ -18,7 +18,8 @@ class Meshes:
     def parts(self, instance, depsgraph):
         """[(file, material slot's material or None)] of a depsgraph instance's object."""
         ob = instance.object
-        slots = tuple(slot.material.name if slot.material else None for slot in ob.material_slots)
+        # By themselves: those of libraries may have the names of others.
+        slots = tuple(slot.material.original if slot.material else None for slot in ob.material_slots)
         data = ob.data
         key = (data.as_pointer(), slots) if ob.type == "MESH" else (ob.original.as_pointer(), slots)
         if key not in self._parts:
@@ -45,10 +46,10 @@ class Meshes:
         return found
 
     def _material(self, mesh, slots, index):
-        name = slots[index] if index < len(slots) else None
-        if name is None and index < len(mesh.materials) and mesh.materials[index]:
-            name = mesh.materials[index].name
-        return self.materials.original(name) if name else None
+        material = slots[index] if index < len(slots) else None
+        if material is None and index < len(mesh.materials) and mesh.materials[index]:
+            material = mesh.materials[index].original
+        return material
 
     def _uv_layers(self, mesh, material):
         """The UV maps that the material names, the active one in place of any that the mesh lacks."""
@@ -56,7 +57,11 @@ class Meshes:
         active = next((layer for layer in layers if layer.active_render), None)
         if active is None:
             return []
-        return [layers.get(name, active) if name else active for name in self.materials.uv_maps(material)]
+        names = self.materials.uv_maps(material)
+        for name in names:
+            if name and name not in layers:
+                self.report.add(mesh.name, f"the UV map {name}, which it has not", "its active one")
+        return [layers.get(name, active) if name else active for name in names]
 
     def _colours(self, mesh, material):
         wanted = self.materials.colour_attribute(material)

@@ -62,18 +62,23 @@ class Place:
                 socket = internal.from_socket
             elif node.type == "GROUP" and node.node_tree is not None:
                 inside = output_of_group(node.node_tree)
-                found = inside and inside.inputs.get(socket.name)
+                found = inside and same(inside.inputs, socket)
                 if not found:
                     return socket, groups
                 socket, groups = found, groups + (node,)
             elif node.type == "GROUP_INPUT" and groups:
-                found = groups[-1].inputs.get(socket.name)
+                found = same(groups[-1].inputs, socket)
                 if not found:
                     return socket, groups
                 socket, groups = found, groups[:-1]
             else:
                 return socket, groups
         return socket, groups
+
+
+def same(sockets, socket):
+    """The socket of a group's other side; names may stand twice."""
+    return next((other for other in sockets if other.identifier == socket.identifier), None)
 
 
 def output_of_group(tree):

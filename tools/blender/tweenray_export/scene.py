@@ -52,23 +52,32 @@ def write(scene, folder):
     os.makedirs(folder, exist_ok=True)
     export = Export(scene, folder)
     render = scene.render
-    kept = render.engine, render.use_compositing, render.use_sequencer, scene.frame_current, scene.frame_subframe
+    # Freestyle draws its lines in a depsgraph of its own, which crashes without a picture.
+    switches = ("use_compositing", "use_sequencer", "use_freestyle", "use_multiview")
+    kept = {name: getattr(render, name) for name in ("engine", *switches)}
+    frame = scene.frame_current, scene.frame_subframe
     bpy.utils.register_class(Engine)
     try:
+        # Materials, world and settings are read as they are in the file, to which animated values are written here.
+        scene.frame_set(scene.frame_start)
+        export.note_settings()
         export.sky = export.world.prepare(scene)
-        render.engine, render.use_compositing, render.use_sequencer = Engine.bl_idname, False, False
+        for name in switches:
+            setattr(render, name, False)
+        render.engine = Engine.bl_idname
         Engine.export = export
         bpy.ops.render.render(scene=scene.name)
+        if export.error is None and export.records:
+            return export.finish()
     finally:
         Engine.export = None
-        render.engine, render.use_compositing, render.use_sequencer = kept[:3]
-        scene.frame_set(kept[3], subframe=kept[4])
+        for name, value in kept.items():
+            setattr(render, name, value)
+        scene.frame_set(frame[0], subframe=frame[1])
         bpy.utils.unregister_class(Engine)
     if export.error is not None:
         raise export.error
-    if not export.records:
-        raise ValueError(f"{scene.name}: Blender evaluated no view layer; enable one for rendering")
-    return export.finish()
+    raise ValueError(f"{scene.name}: Blender evaluated no view layer; enable one for rendering")
 
 
 class Export:
@@ -82,7 +91,7 @@ class Export:
         self.world = World(images, self.report)
         self.sky, self.error = None, None
         self.records, self.placed, self.lamps = [], [], []
-        self.names, self.used = {}, set()
+        self.used, self.clipping = set(), None
 
     def take(self, engine, depsgraph):
         """The scene at its first frame, and the camera at every frame."""
@@ -96,6 +105,8 @@ class Export:
             # First, since a camera that cannot be exported shall leave no files.
             self.camera(depsgraph)
             if frame == frames[0]:
+                self.note_layer(depsgraph.view_layer)
+                self.clipping = camera.Clipping(scene.camera.evaluated_get(depsgraph), self.report)
                 self.geometry(depsgraph)
                 before = places(depsgraph)
             if frame in (frames[len(frames) // 2], frames[-1]) and frame != frames[0]:
@@ -109,17 +120,52 @@ class Export:
         self.records.append(camera.record(ob, depsgraph, size(self.scene), self.report))
 
     def note_moves(self, before, now, frame):
-        for name, matrix in now.items():
-            if name not in before:
+        for name in before.keys() - now.keys():
+            self.report.add(name[0], "it disappears during the shot", f"it stays as at frame {frame}")
+        for key, matrix in now.items():
+            name = key[0]
+            if key not in before:
                 self.report.add(name, "it appears during the shot", f"it is absent, as at frame {frame}")
-            elif any(abs(a - b) > 1e-5 * max(1.0, abs(a)) for a, b in zip(before[name], matrix)):
+            elif any(abs(a - b) > 1e-5 * max(1.0, abs(a)) for a, b in zip(before[key], matrix)):
                 self.report.add(name, "it moves or changes during the shot", f"it stays as at frame {frame}")
 
+    def note_settings(self):
+        """Notes settings of the scene that tweenray has not, and what of it is animated."""
+        scene, render = self.scene, self.scene.render
+        if scene.cycles.diffuse_bounces > 0 and scene.cycles.max_bounces > 0:
+            self.report.add(scene.name, "light from surface to surface (diffuse bounces)", "none")
+        if render.film_transparent:
+            self.report.add(scene.name, "a transparent film", "the sky is seen")
+        nodes = getattr(scene, "compositing_node_group", None) or (scene.use_nodes and getattr(scene, "node_tree", None))
+        if render.use_compositing and nodes:
+            self.report.add(scene.name, "compositing", "none")
+        if render.use_freestyle:
+            self.report.add(scene.name, "Freestyle", "no lines")
+        if render.use_multiview:
+            self.report.add(scene.name, "stereoscopy", "the camera's own view")
+        if scene.cycles.pixel_filter_type != "BOX" and not math.isclose(scene.cycles.filter_width, 1.5, rel_tol=1e-3):
+            self.report.add(scene.name, f"a pixel filter {scene.cycles.filter_width:g} wide", "tweenray's own width")
+        if is_animated(scene):
+            self.report.add(scene.name, "animated settings", f"as at frame {scene.frame_start}")
+
+    def note_layer(self, layer):
+        """Notes what a view layer changes of objects."""
+        if layer.material_override is not None:
+            self.report.add(layer.name, "a material override", "each object's own material")
+        collections = [layer.layer_collection]
+        for collection in collections:
+            collections.extend(collection.children)
+            for use, what in ((collection.holdout, "holdout"), (collection.indirect_only, "indirect only")):
+                if use and not collection.exclude:
+                    self.report.add(collection.name, what, "its objects are ordinary surfaces")
+
     def geometry(self, depsgraph):
+        # Curves, text, surfaces and metaballs come as they are, and their meshes once more as instances.
+        meshed = {i.object.original for i in depsgraph.object_instances if is_mesh_of_another(i.object)}
         for instance in depsgraph.object_instances:
-            if not instance.show_self:
-                continue
             ob = instance.object
+            if not instance.show_self or (ob.type != "MESH" and ob.original in meshed):
+                continue
             if ob.type == "LIGHT":
                 self.light(ob, instance.matrix_world.copy())
             elif ob.type in SURFACES:
@@ -130,6 +176,14 @@ class Export:
                 self.report.add(ob.name, "hair", "not exported")
 
     def light(self, ob, matrix):
+        if getattr(ob.data.cycles, "is_portal", False):
+            self.report.add(ob.name, "a portal", "not exported: it gives no light of its own")
+            return
+        if is_animated(ob.data) or is_animated(ob.data.node_tree):
+            self.report.add(ob.name, "its light is animated", f"as at frame {self.scene.frame_start}")
+        for ray in ("diffuse", "glossy", "transmission", "volume_scatter"):
+            if not getattr(ob, f"visible_{ray}"):
+                self.report.add(ob.name, f"a light that {ray.replace('_', ' ')} rays do not see", "it lights everything")
         linking = ob.light_linking
         if linking.receiver_collection is not None or linking.blocker_collection is not None:
             self.report.add(ob.name, "light linking", "it lights everything")
@@ -148,11 +202,14 @@ class Export:
             self.report.add(ob.name, "a scale of 0 flattens it", "not exported")
             return
         self.note_visibility(ob)
+        self.clipping.note(ob, matrix)
         for file, material in self.meshes.parts(instance, depsgraph):
             made = self.materials.made(material)
             if not made.is_seen:
                 continue
-            name = material.name if material else DEFAULT
+            name = material.name_full if material else DEFAULT
+            if material and (is_animated(material) or is_animated(material.node_tree)):
+                self.report.add(name, "it is animated", f"as at frame {self.scene.frame_start}")
             self.used.add(name)
             self.placed.append((ob.name, file, name, axes.matrix(matrix)))
 
@@ -244,16 +301,29 @@ def camera_text(records):
 def size(scene):
     """(width, height) of the picture, pixels."""
     render = scene.render
-    share = 0.01 * render.resolution_percentage
-    return max(int(render.resolution_x * share), 1), max(int(render.resolution_y * share), 1)
+    percent = render.resolution_percentage
+    return max(render.resolution_x * percent // 100, 1), max(render.resolution_y * percent // 100, 1)
+
+
+def is_animated(block):
+    """Whether values of a data-block change with time."""
+    data = block and block.animation_data
+    return bool(data and (data.action or data.drivers or data.nla_tracks))
+
+
+def is_mesh_of_another(ob):
+    """Whether it is the mesh that Blender made of a curve, text, surface or metaball."""
+    return ob.type == "MESH" and ob.original.type != "MESH"
 
 
 def places(depsgraph):
-    """{name: numbers of its placement and form} of what is seen, but for instances."""
+    """{(name, which of its instances): numbers of its placement and form} of what is seen."""
     found = {}
     for instance in depsgraph.object_instances:
-        if not instance.is_instance and instance.object.type in SURFACES | {"LIGHT"}:
-            found[instance.object.name] = numbers(instance.object, instance.matrix_world)
+        ob = instance.object
+        if instance.show_self and ob.type in SURFACES | {"LIGHT"}:
+            parent = instance.parent.name if instance.parent else ""
+            found[ob.name, ob.type, parent, tuple(instance.persistent_id)] = numbers(ob, instance.matrix_world)
     return found
 
 

@@ -201,7 +201,7 @@ class Writer:
         table = made.table if table is None else table
         value = self.read(fed, name)
         if value.image is not None and value.image.channel is None:
-            file = self.images.colour(value.image.image)
+            file = self.images.colour(value.image.image, value.image.times_alpha)
             if file is not None:
                 table[image_key] = self.laid(value.image, file)
         elif value.image is not None:
@@ -265,7 +265,7 @@ class Writer:
         value = self.read(fed, colour)
         file = None
         if value.image is not None and value.image.channel is None and value.colours is None:
-            file = self.images.colour(value.image.image)
+            file = self.images.colour(value.image.image, value.image.times_alpha)
         if file is None:
             value = self.constant(fed, colour)
         rgb = [max(c * factor, 0.0) for c in value.rgb()]
@@ -279,6 +279,12 @@ class Writer:
         if "glass" in made.table:
             self.note("alpha on glass", "none")
             return
+        if value.grey() < 0.5:
+            self.note("alpha that is less than a half everywhere", "nothing")
+            made.is_seen = False
+            return
+        if not math.isclose(value.grey(), 1.0, rel_tol=1e-6):
+            self.note("a factor of an image's alpha", "1")
         if value.image.channel in ("r", "g", "b"):
             self.note("one channel of an image as alpha", "all of the image's")
         file = self.images.alpha(value.image.image)

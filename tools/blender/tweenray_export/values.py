@@ -34,10 +34,11 @@ class Value:
 
 
 class Laid:
-    """An image node: `image`, the channel that counts (r, g, b, a, or None for the colour), and the table of how it lies."""
+    """An image node: `image`, the channel that counts (r, g, b, a, or None for the colour), the table of how it lies, its UV
+    map, and whether its colour counts times its alpha."""
 
-    def __init__(self, image, channel, table, uv_map):
-        self.image, self.channel, self.table, self.uv_map = image, channel, table, uv_map
+    def __init__(self, image, channel, table, uv_map, times_alpha):
+        self.image, self.channel, self.table, self.uv_map, self.times_alpha = image, channel, table, uv_map, times_alpha
 
 
 class Reader:
@@ -64,6 +65,8 @@ class Reader:
         if kind in ("RGB", "VALUE"):
             value = fed.output.default_value
             return Value(list(value) if hasattr(value, "__len__") else value)
+        if kind == "TEX_IMAGE" and node.image is not None and fed.output.name == "Alpha" and node.image.alpha_mode == "NONE":
+            return Value(1.0)
         if kind == "TEX_IMAGE" and node.image is not None:
             return Value([1.0] * 3, image=self.laid(fed, "a" if fed.output.name == "Alpha" else None))
         if kind == "VERTEX_COLOR" and fed.output.name == "Color":
@@ -133,11 +136,15 @@ class Reader:
             wrap = "clamp"
         if wrap:
             table["wrap"] = wrap
+        if node.image.source == "TILED":
+            self.report.add(self.name, f"the tiles of the image {node.image.name}", "its first tile everywhere")
         if node.projection != "FLAT":
             self.report.add(self.name, f"the projection {node.projection} of an image", "texture coordinates")
         uv_map, steps = self.mapping(fed.input("Vector"))
         table |= steps
-        return Laid(node.image, channel, table, uv_map)
+        # Cycles multiplies colours by alpha unless a node takes the alpha too.
+        is_opaque = channel is None and not node.outputs["Alpha"].is_linked and node.image.alpha_mode in ("STRAIGHT", "PREMUL")
+        return Laid(node.image, channel, table, uv_map, is_opaque)
 
     def mapping(self, place):
         """(name of the UV map or None, keys of the texture's table) of a texture's vector."""

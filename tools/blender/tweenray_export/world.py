@@ -25,6 +25,10 @@ class World:
         world = scene.world
         if world is None:
             return None
+        if any(block and block.animation_data for block in (world, world.node_tree)):
+            self.report.add(world.name, "the world is animated", f"as at frame {scene.frame_start}")
+        if not world.cycles_visibility.camera:
+            self.report.add(world.name, "a world that is invisible to the camera", "it is seen")
         if world.node_tree is None:
             return self.constant(list(world.color))
         if world.node_tree.get_output_node("CYCLES") is None:
