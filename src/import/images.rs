@@ -120,9 +120,7 @@ impl Images {
     pub fn doubt(&mut self, path: &Path, what: ImageUse) -> Option<&'static str> {
         let is_cut = self.image(path, what)?.is_cut;
         match (what, self.looks_like_normals(path, what)?) {
-            (ImageUse::Colour, false) if is_cut => Some(
-                "colours above 1 are cut to 1: no surface reflects more light than it receives",
-            ),
+            (ImageUse::Colour, false) if is_cut => Some(texture::CUT_COLOURS),
             (ImageUse::Normals, false) => Some(
                 "this does not look like a normal map: few of its texels are unit vectors in tangent space",
             ),
@@ -159,29 +157,35 @@ fn decode((path, uses): (PathBuf, BTreeSet<ImageUse>)) -> Vec<((PathBuf, ImageUs
         Err(error) => Err(error.clone()),
     };
     let of = |what| {
-        let state = image(what).map_or_else(State::Refused, State::Decoded);
+        let (state, is_cut) = match image(what) {
+            Ok((texels, is_cut)) => (State::Decoded(texels), is_cut),
+            Err(error) => (State::Refused(error), false),
+        };
         let looks_like_normals = match (what, &state) {
             (ImageUse::Colour | ImageUse::Normals, State::Decoded(Texels::Texture(texture))) => {
                 Some(texture.looks_like_normals())
             }
             _ => None,
         };
-        let is_cut = what == ImageUse::Colour && decoded.as_ref().is_ok_and(texture::is_above_one);
         ((path.clone(), what), Image { state, looks_like_normals, is_cut })
     };
     uses.into_par_iter().map(of).collect()
 }
 
 impl ImageUse {
-    /// What the world holds of `image` in this use.
-    fn texels(self, path: &Path, image: &DynamicImage) -> Result<Texels> {
-        match self {
-            Self::Colour => texture::reflectances(path, image).map(Texels::Texture),
-            Self::Light => texture::colours(path, image).map(Texels::Texture),
-            Self::Data(channel) => texture::data(path, image, channel).map(Texels::Texture),
-            Self::Normals => texture::normals(path, image).map(Texels::Texture),
-            Self::Mask => alpha::mask_of(path, image).map(Texels::Mask),
-        }
+    /// What the world holds of `image` in this use, and whether colours above 1 were cut.
+    fn texels(self, path: &Path, image: &DynamicImage) -> Result<(Texels, bool)> {
+        let texture = match self {
+            Self::Colour => {
+                let (texture, is_cut) = texture::reflectances(path, image)?;
+                return Ok((Texels::Texture(texture), is_cut));
+            }
+            Self::Mask => return Ok((Texels::Mask(alpha::mask_of(path, image)?), false)),
+            Self::Light => texture::colours(path, image)?,
+            Self::Data(channel) => texture::data(path, image, channel)?,
+            Self::Normals => texture::normals(path, image)?,
+        };
+        Ok((Texels::Texture(texture), false))
     }
 }
 

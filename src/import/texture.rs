@@ -40,28 +40,27 @@ pub fn load_texture(path: &Path) -> Result<Texture> {
     colours(path, &decode(path)?)
 }
 
+/// What a warning says of colours that [`reflectances`] cuts.
+pub(super) const CUT_COLOURS: &str =
+    "colours above 1 are cut to 1: no surface reflects more light than it receives";
+
 /// The colours of a decoded image, in codes of 8 bits if it has no more.
 ///
 /// Errors: a pixel that is no light.
 pub(super) fn colours(path: &Path, image: &DynamicImage) -> Result<Texture> {
-    colours_up_to(path, image, f32::INFINITY)
+    Ok(colours_up_to(path, image, f32::INFINITY)?.0)
 }
 
-/// [`colours`] of which none is above 1, as no surface reflects more than it receives.
-pub(super) fn reflectances(path: &Path, image: &DynamicImage) -> Result<Texture> {
+/// [`colours`] of which none is above 1, as no surface reflects more than it receives, and whether any was.
+pub(super) fn reflectances(path: &Path, image: &DynamicImage) -> Result<(Texture, bool)> {
     colours_up_to(path, image, 1.0)
 }
 
-/// Whether [`reflectances`] cuts a colour of the image.
-pub(super) fn is_above_one(image: &DynamicImage) -> bool {
-    let is_integer = image.as_flat_samples_u8().is_some() || image.as_flat_samples_u16().is_some();
-    !is_integer && floats(image).iter().flatten().any(|c| *c > 1.0)
-}
-
-fn colours_up_to(path: &Path, image: &DynamicImage, most: f32) -> Result<Texture> {
+/// The colours of a decoded image, cut at `most`, and whether any was above.
+fn colours_up_to(path: &Path, image: &DynamicImage, most: f32) -> Result<(Texture, bool)> {
     let (name, size) = (path.display().to_string(), [image.width(), image.height()]);
     if let Some(codes) = image.as_flat_samples_u8() {
-        return Ok(Texture::from_srgb(name, size, rgb(codes.samples, image).collect()));
+        return Ok((Texture::from_srgb(name, size, rgb(codes.samples, image).collect()), false));
     }
     let texels: Vec<Rgb> = match image.as_flat_samples_u16() {
         Some(codes) => {
@@ -75,8 +74,9 @@ fn colours_up_to(path: &Path, image: &DynamicImage, most: f32) -> Result<Texture
     if !texels.iter().all(|c| Fault::of(c.to_array()).is_none()) {
         return Err(bad_pixel(path));
     }
+    let is_cut = texels.iter().any(|c| c.max_element() > most);
     let texels = texels.into_iter().map(|c| c.min(Rgb::splat(most))).collect();
-    Ok(Texture::from_linear(name, size, texels))
+    Ok((Texture::from_linear(name, size, texels), is_cut))
 }
 
 /// The normals of a decoded image: red, green and blue as they stand.
@@ -311,10 +311,12 @@ mod tests {
             image::Rgb32FImage::from_pixel(1, 1, image::Rgb([0.5, 1.0, 3.0])).into();
         let texel = |texture: Texture| texture.levels()[0].texel(0, 0);
         assert_eq!(texel(colours(path, &image).expect("light")), Rgb::new(0.5, 1.0, 3.0));
-        assert_eq!(texel(reflectances(path, &image).expect("colours")), Rgb::new(0.5, 1.0, 1.0));
-        assert!(is_above_one(&image));
+        let (cut, is_cut) = reflectances(path, &image).expect("colours");
+        assert_eq!((texel(cut), is_cut), (Rgb::new(0.5, 1.0, 1.0), true));
         let white: DynamicImage = image::Rgb32FImage::from_pixel(1, 1, image::Rgb([1.0; 3])).into();
-        assert!(!is_above_one(&white) && !is_above_one(&white.to_rgb8().into()));
+        for white in [white.to_rgb8().into(), white.to_rgb16().into(), white] {
+            assert!(!reflectances(path, &white).expect("colours").1);
+        }
         for bad in [f32::NAN, f32::INFINITY, -0.5] {
             let bad = image::Rgb32FImage::from_pixel(1, 1, image::Rgb([0.5, bad, 0.5])).into();
             assert!(reflectances(path, &bad).is_err() && colours(path, &bad).is_err());
