@@ -1,6 +1,6 @@
 //! What glTF says of surfaces, as the numbers of materials.
 
-use super::build::{File, warns};
+use super::build::{File, Written, warns};
 use serde_json::{Value, json};
 use tweenray::import::Model;
 use tweenray::math::{DAffine2, DVec2, Rgb, srgb_decode};
@@ -375,4 +375,53 @@ fn variants_of_materials_are_named() {
     file.json["extensions"] = json!({"KHR_materials_variants": {"variants": names}});
     file.json["extensionsRequired"] = json!(["KHR_materials_variants", "KHR_audio_emitter"]);
     assert!(warns(&file.model().warnings, "materials have variants (red, blue)"));
+}
+
+/// A triangle whose base colour, emission and specular colour are the Radiance image `sky.hdr` of (2, 1, 0.5).
+fn bright() -> Model {
+    let mut file = File::triangle().with_uvs();
+    let source = file.add("images", json!({"uri": "sky.hdr"}));
+    let info = json!({"index": file.add("textures", json!({"source": source}))});
+    let file = file.with_material(json!({
+        "name": "snow",
+        "pbrMetallicRoughness": {"baseColorTexture": info},
+        "emissiveTexture": info,
+        "emissiveFactor": [1, 1, 1],
+        "extensions": {"KHR_materials_specular": {"specularColorTexture": info}},
+    }));
+    let written = Written::of("test.glb", &file.glb());
+    let picture = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 1\n\x80\x40\x20\x82";
+    written.beside("sky.hdr", picture);
+    written.model().expect("a model")
+}
+
+#[test]
+fn base_colours_above_one_are_cut_with_a_warning_and_factors_and_emission_are_not() {
+    let model = bright();
+    let material = &model.world.materials[0];
+    let texel = |map: Option<TextureMap>| {
+        model.world.textures[map.expect("an image").image as usize].levels()[0].texel(0, 0)
+    };
+    assert_eq!(texel(material.texture), Rgb::new(1.0, 1.0, 0.5));
+    assert_eq!(texel(material.emission_map), Rgb::new(2.0, 1.0, 0.5));
+    let specular = material.fresnel.and_then(|fresnel| fresnel.specular_colour_map);
+    assert_eq!(texel(specular), Rgb::new(2.0, 1.0, 0.5));
+    let [warning] = &model.warnings[..] else { panic!("{:?}", model.warnings) };
+    assert!(warning.message.starts_with("material `snow`: baseColorTexture "), "{warning}");
+    let end =
+        "sky.hdr: colours above 1 are cut to 1: no surface reflects more light than it receives";
+    assert!(warning.message.ends_with(end), "{warning}");
+}
+
+#[test]
+fn an_image_of_codes_that_is_base_colour_and_emission_is_one_texture() {
+    let mut file = File::triangle().with_uvs();
+    let info = json!({"index": file.image(1, &[[51, 102, 153, 255]], json!({}))});
+    let file = file.with_material(json!({
+        "pbrMetallicRoughness": {"baseColorTexture": info},
+        "emissiveTexture": info,
+        "emissiveFactor": [1, 1, 1],
+    }));
+    let model = file.model();
+    assert!(model.world.textures.len() == 1 && model.warnings.is_empty());
 }

@@ -10,7 +10,7 @@ use crate::scene::{AlphaMask, World};
 use image::DynamicImage;
 use rayon::prelude::*;
 use std::borrow::Cow;
-use std::collections::{BTreeSet, HashMap};
+use std::collections::{BTreeSet, HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
 /// Most pixels of all images of a file: 4 GB.
@@ -19,7 +19,10 @@ const MOST_PIXELS: u64 = 1 << 30;
 /// What an image serves as.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(super) enum Role {
+    /// Reflectances, which are at most 1.
     Colour,
+    /// Colours of any size: emission, and factors.
+    Light,
     /// One channel.
     Share(ImageChannel),
     Normals,
@@ -32,6 +35,8 @@ pub(super) enum Role {
 pub(super) struct ImageStore {
     decoded: HashMap<usize, (PathBuf, DynamicImage)>,
     placed: HashMap<(usize, Role), Option<u32>>,
+    /// Images of which colours above 1 were cut.
+    cut: HashSet<usize>,
 }
 
 impl ImageStore {
@@ -68,7 +73,7 @@ impl ImageStore {
         // Of several that cannot be read the first one is the error, whatever the threads.
         let decoded: Vec<Result<_>> = encoded.into_par_iter().map(decode).collect();
         let decoded = decoded.into_iter().collect::<Result<HashMap<_, _>>>()?;
-        Ok(Self { decoded, placed: HashMap::new() })
+        Ok(Self { decoded, ..Self::default() })
     }
 
     /// The number of an image, which was decoded, among the textures or masks of `world`, which takes it when it is first
@@ -76,12 +81,22 @@ impl ImageStore {
     ///
     /// Errors: pixels that are no light, or no share.
     pub fn place(&mut self, image: usize, role: Role, world: &mut World) -> Result<Option<u32>> {
+        let Some((name, decoded)) = self.decoded.get(&image) else { return Ok(None) };
+        // Only floats may be above 1: of all others one texture serves as both.
+        let is_same = role == Role::Light && decoded.as_flat_samples_f32().is_none();
+        let role = if is_same { Role::Colour } else { role };
         if let Some(number) = self.placed.get(&(image, role)) {
             return Ok(*number);
         }
-        let Some((name, decoded)) = self.decoded.get(&image) else { return Ok(None) };
         let texture = match role {
-            Role::Colour => Some(texture::colours(name, decoded)?),
+            Role::Colour => {
+                let (texture, is_cut) = texture::reflectances(name, decoded)?;
+                if is_cut {
+                    self.cut.insert(image);
+                }
+                Some(texture)
+            }
+            Role::Light => Some(texture::colours(name, decoded)?),
             Role::Share(channel) => Some(texture::data(name, decoded, channel)?),
             Role::Normals => Some(texture::normals(name, decoded)?),
             Role::Mask(_) => None,
@@ -99,6 +114,12 @@ impl ImageStore {
         };
         self.placed.insert((image, role), number);
         Ok(number)
+    }
+
+    /// The name of an image of which colours above 1 were cut.
+    pub fn cut(&self, image: usize) -> Option<&Path> {
+        let is_cut = self.cut.contains(&image);
+        self.decoded.get(&image).filter(|_| is_cut).map(|(name, _)| name.as_path())
     }
 
     /// Whether an image has an alpha channel with anything that is not opaque.

@@ -7,7 +7,7 @@ use super::node::name_of;
 use super::texture_info::{LaidImage, TextureTable};
 use crate::error::Result;
 use crate::import::source::Notes;
-use crate::import::texture::ImageChannel;
+use crate::import::texture::{CUT_COLOURS, ImageChannel};
 use crate::math::Rgb;
 use crate::scene::{Fresnel, Glass, Material, NormalMap, TextureMap, World};
 use std::collections::BTreeSet;
@@ -173,10 +173,14 @@ impl<'d> MaterialReader<'d> {
     ) -> Result<Surfaced> {
         let json = &self.document.materials[at];
         let laid = self.laid(json, notes)?;
-        let uv_sets = laid.uv_sets();
+        let (base, uv_sets) = (laid.base, laid.uv_sets());
         let mut parts = Parts { json, laid, uv_sets, images, world, notes };
         let mut surfaced = parts.read(coloured)?;
         surfaced.material.name = name_of(json, "material", at)?;
+        if let Some(image) = base.and_then(|base| images.cut(base.image)) {
+            let (name, image) = (&surfaced.material.name, image.display());
+            notes.add(&format!("material `{name}`: baseColorTexture {image}: {CUT_COLOURS}"), None);
+        }
         Ok(surfaced)
     }
 }
@@ -244,7 +248,7 @@ impl Parts<'_, '_> {
         let fresnel = Fresnel {
             grazing,
             specular_map: self.map(self.laid.specular, Role::Share(ImageChannel::Alpha))?,
-            specular_colour_map: self.map(self.laid.specular_colour, Role::Colour)?,
+            specular_colour_map: self.map(self.laid.specular_colour, Role::Light)?,
             metallic,
             metallic_map,
             clearcoat,
@@ -316,7 +320,7 @@ impl Parts<'_, '_> {
             None => 1.0,
         };
         let emission = factor.map(|x| (x.max(0.0) * strength).min(1e30) as f32);
-        Ok((Rgb::from_array(emission), self.map(self.laid.emissive, Role::Colour)?))
+        Ok((Rgb::from_array(emission), self.map(self.laid.emissive, Role::Light)?))
     }
 
     /// How the surface's alpha is read, `factor` times that of its image.
