@@ -62,7 +62,15 @@ fn convert(
     if let Some((line, name)) = &source.texture {
         let file = source::beside(path, name);
         match images.place(&file, ImageUse::Colour, &mut model.world, &mut model.files) {
-            Ok(id) => (out.texture, out.diffuse) = (Some(TextureMap::of(id)), Rgb::ONE),
+            Ok(id) => {
+                (out.texture, out.diffuse) = (Some(TextureMap::of(id)), Rgb::ONE);
+                let doubt = images.doubt(&file, ImageUse::Colour);
+                let warn = |doubt| {
+                    let message = format!("material {number}: `texture_file` {name}: {doubt}");
+                    Diagnostic::new(path, message).line(*line)
+                };
+                model.warnings.extend(doubt.map(warn));
+            }
             Err(error) => {
                 let message = format!("texture left out: {error}");
                 model.warnings.push(Diagnostic::new(path, message).line(*line));

@@ -81,6 +81,21 @@ fn the_course_scene_is_read_whole() {
     assert_eq!(light.radiance, Rgb::splat(2.0));
 }
 
+#[test]
+fn colours_above_one_of_a_course_texture_are_cut_with_a_warning() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let bright = image::Rgb32FImage::from_pixel(1, 1, image::Rgb([0.5, 1.0, 3.0]));
+    bright.save(folder.path().join("bright.exr")).expect("written");
+    let obj = folder.path().join("a.obj");
+    let text = "material\nmaterial\ntexture_file bright.exr\nm 1\ns 0 0 0 1\n";
+    std::fs::write(&obj, text).expect("written");
+    let Model { world, warnings, .. } = load_model(&obj, SMOOTH).expect("read");
+    assert_eq!(world.textures[0].levels()[0].texel(0, 0), Rgb::new(0.5, 1.0, 1.0));
+    let [warning] = &warnings[..] else { panic!("{warnings:?}") };
+    let message = "material 1: `texture_file` bright.exr: colours above 1 are cut to 1: ";
+    assert!(warning.message.starts_with(message) && warning.line == Some(3), "{warning}");
+}
+
 /// `cargo test --release --lib ten_million -- --ignored --nocapture` says how long import takes.
 #[test]
 #[ignore = "takes a minute and a gigabyte of disk"]
