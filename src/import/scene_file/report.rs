@@ -1,5 +1,6 @@
 //! Errors in the scene file's text as a [`Diagnostic`] with line, column and advice.
 
+use super::SceneFile;
 use super::at::Span;
 use crate::error::{Diagnostic, Error, Result};
 use crate::scene::Light;
@@ -93,11 +94,43 @@ impl Source {
         if let Some(name) = message.strip_prefix("missing field ") {
             return self.fault(&span, format!("the key {name} is missing"));
         }
-        if message.starts_with("wanted exactly 1 element") {
+        let is_no_kind = message.starts_with("wanted exactly 1 element");
+        if is_no_kind || message == "wanted string or table" {
+            if let Some(names) = self.names_at(&span) {
+                return self.fault(&span, format!("expected {names}"));
+            }
+        }
+        if is_no_kind {
             let text = "exactly one key that says the kind must stand here";
             return self.fault(&span, text).help(kinds());
         }
         self.fault(&span, in_plain_words(message))
+    }
+
+    /// The names of which one may stand in quotes in place of the value at `span`, where that is all that may. The TOML reader
+    /// lists names only beside a name that is none of them, so it reads the text again with one there.
+    fn names_at(&self, span: &Span) -> Option<String> {
+        let (before, after) = (self.text.get(..span.start)?, self.text.get(span.end..)?);
+        let with = |name: &str| {
+            let error = toml::from_str::<SceneFile>(&format!("{before}\"{name}\"{after}")).err()?;
+            error
+                .span()
+                .is_some_and(|at| at.start == span.start)
+                .then(|| error.message().to_owned())
+        };
+        let told = with("")?;
+        let names = quoted(told.strip_prefix("unknown variant ``, expected ")?);
+        // A kind of light and the like is the key of a table, and no value.
+        if with(names.first()?).is_some() {
+            return None;
+        }
+        let names: Vec<String> = names.iter().map(|name| format!("\"{name}\"")).collect();
+        let (last, others) = names.split_last()?;
+        Some(if others.is_empty() {
+            last.clone()
+        } else {
+            format!("{} or {last}", others.join(", "))
+        })
     }
 
     /// A number like `.7` or `7.` at the start of `span` or around it, and how it is written in full.
