@@ -139,12 +139,16 @@ impl<'a> Builder<'a> {
         if let (Shown::Image(file), EnvironmentKind::Image(image)) = (&shown, &environment.kind) {
             let brightest = scene::brightest(&self.world.textures[*image as usize]);
             let seen = f64::from(brightest) * f64::from(environment.strength);
+            let name = &file.value;
             if seen == 0.0 {
-                return Err(self.at_span(&file.span, "the image is black, so it sends no light"));
+                let message =
+                    format!("{name}: the image is black everywhere, so it lights nothing");
+                return Err(self.at_span(&file.span, message));
             }
             if seen > 1e30 {
-                let message =
-                    format!("the image is too bright: {seen:e} with `strength`, 1e30 at most");
+                let message = format!(
+                    "{name}: the image is too bright: {seen:e} with `strength`, 1e30 at most"
+                );
                 return Err(self.at_span(&file.span, message));
             }
         }

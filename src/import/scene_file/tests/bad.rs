@@ -452,11 +452,11 @@ fn images_that_send_no_light_are_refused_at_their_key() {
         let message = refusal(strength, texels).expect("an error");
         assert!(message.contains(what), "{message}");
     };
-    says("", [0.0; 3], "black");
+    says("", [0.0; 3], "sky.exr: the image is black everywhere, so it lights nothing");
     says("", [1.0, f32::NAN, 0.0], "not a finite number");
     says("", [1.0, f32::INFINITY, 0.0], "not a finite number");
     says("", [1.0, -1.0, 0.0], "negative");
-    says("strength = 1e20", [1e20; 3], "too bright");
+    says("strength = 1e20", [1e20; 3], "sky.exr: the image is too bright");
     assert_eq!(refusal("strength = 1e20", [1.0; 3]), None);
 }
 
