@@ -1,6 +1,7 @@
 //! `[[mesh]]` and `[[sphere]]`.
 
 use super::at::{At, Span};
+use super::file_name;
 use super::generated::{Cuboid, Quad, Terrain, UvSphere};
 use super::number::{Crease, Moment, Positive};
 use super::report::Source;
@@ -23,6 +24,7 @@ pub(super) struct Mesh {
     /// Name in messages. Absent: the file's name or the kind.
     pub name: Option<String>,
     /// Mesh file, relative to the scene file: .obj (with .mtl), .ply, .glb or .gltf.
+    #[serde(default, deserialize_with = "file_name::placed")]
     pub file: Option<At<String>>,
     /// A box with faces along the axes.
     #[serde(rename = "box")]

@@ -8,6 +8,7 @@
 mod at;
 mod build;
 mod camera;
+mod file_name;
 mod fog;
 mod generated;
 mod light;

@@ -1,6 +1,7 @@
 //! `[sky]`.
 
 use super::at::{At, Span};
+use super::file_name;
 use super::light::sun_angle;
 use super::number::{Degrees, Positive, SunAngle, Turbidity};
 use super::report::Source;
@@ -18,6 +19,7 @@ pub(super) struct Sky {
     /// Radiance of a sky of one colour, W/(m² sr).
     radiance: Option<At<Amount>>,
     /// Image in latitude and longitude; its middle is seen along -z, what is right of it towards +x.
+    #[serde(default, deserialize_with = "file_name::placed")]
     image: Option<At<String>>,
     /// Radiance by the height above the horizon.
     gradient: Option<At<Gradient>>,

@@ -1,6 +1,7 @@
 //! Images of a material.
 
 use super::at::At;
+use super::file_name;
 use super::number::{Coordinate, Degrees, Factor, NotNegative, Share};
 use super::schema::inline_schema;
 use super::vector::{List, OneOr};
@@ -22,6 +23,7 @@ macro_rules! image_table {
         #[serde(deny_unknown_fields, expecting = "a file name or a table")]
         pub(super) struct $name {
             /// Image file, relative to the scene file.
+            #[serde(deserialize_with = "file_name::required")]
             file: String,
             /// What is seen beyond the image's edges.
             #[serde(default)]
@@ -222,7 +224,7 @@ impl<'de, T: ImageTable + Deserialize<'de>> Visitor<'de> for NamedVisitor<T> {
     }
 
     fn visit_str<E: Error>(self, file: &str) -> Result<Named<T>, E> {
-        Ok(Named(T::of_file(file.to_owned())))
+        file_name::checked(file).map(T::of_file).map(Named)
     }
 
     fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Named<T>, A::Error> {

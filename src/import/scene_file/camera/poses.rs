@@ -10,6 +10,7 @@ use super::{Camera, colmap, nerf};
 use crate::error::{Diagnostic, Error, Result};
 use crate::import::UpAxis;
 use crate::import::scene_file::at::At;
+use crate::import::scene_file::file_name;
 use crate::import::scene_file::report::Source;
 use crate::import::scene_file::schema::inline_schema;
 use crate::import::scene_file::to_y_up;
@@ -33,6 +34,7 @@ pub(super) struct Poses(PosesTable);
 #[serde(deny_unknown_fields, expecting = "a file name or a table")]
 pub(super) struct PosesTable {
     /// `transforms.json` of a NeRF data set, or COLMAP's `images.txt`; relative to the scene file.
+    #[serde(deserialize_with = "file_name::required")]
     file: String,
     /// Axis of the file's world that points up; it is turned to y. Absent: y.
     #[serde(default = "y")]
@@ -160,7 +162,8 @@ impl<'de> Visitor<'de> for PosesVisitor {
     }
 
     fn visit_str<E: serde::de::Error>(self, file: &str) -> std::result::Result<Poses, E> {
-        Ok(Poses(PosesTable { file: file.to_owned(), up: UpAxis::Y }))
+        let file = file_name::checked(file)?;
+        Ok(Poses(PosesTable { file, up: UpAxis::Y }))
     }
 
     fn visit_map<A: MapAccess<'de>>(self, map: A) -> std::result::Result<Poses, A::Error> {

@@ -182,6 +182,22 @@ const TYPES: &[Case] = &[
     ),
 ];
 
+/// Names of files that are empty.
+const UNNAMED: &[Case] = &[
+    ("[material.a]\ntexture = ¦''\n", "the name of the file is empty", ""),
+    ("[material.a]\ntexture = { file = ¦'', scale = 2 }\n", "the name of the file is empty", ""),
+    ("[material.a]\nmirror = 1\nroughness = ¦''\n", "the name of the file is empty", ""),
+    (
+        "[material.a]\nprincipled = { metallic = { file = ¦'' } }\n",
+        "the name of the file is empty",
+        "",
+    ),
+    ("[sky]\nimage = ¦''\n", "the name of the file is empty", ""),
+    ("[[mesh]]\nfile = ¦''\n", "the name of the file is empty", ""),
+    ("[camera]\nposes = ¦''\n", "the name of the file is empty", ""),
+    ("[camera]\nposes = { file = ¦'' }\n", "the name of the file is empty", ""),
+];
+
 const RANGES: &[Case] = &[
     ("[camera]\nfov = ¦180\n", "expected an angle in degrees above 0 and below 180, found 180", ""),
     ("[camera]\nfov = ¦0.0\n", "found 0.0", ""),
@@ -414,6 +430,11 @@ fn unknown_names_are_shown_with_the_nearest() {
 #[test]
 fn wrong_types_are_shown_where_they_stand() {
     check(TYPES);
+}
+
+#[test]
+fn empty_names_of_files_are_shown_where_they_stand() {
+    check(UNNAMED);
 }
 
 #[test]
