@@ -21,8 +21,9 @@ use tweenray::intersect::{
 };
 use tweenray::math::{DVec3, Rgb, Vec2};
 use tweenray::scene::{
-    AlphaMask, CameraPath, HitRules, IntersectorKind, Light, Material, PointLight, Pose, QuadLight,
-    Scene, Settings, Shot, Sky, TextureMap, World, WorldMesh, WorldSphere,
+    AlphaMask, CameraPath, Glass, GlassShadows, HitRules, IntersectorKind, Light, Material,
+    PointLight, Pose, QuadLight, Scene, Settings, Shot, Sky, TextureMap, World, WorldMesh,
+    WorldSphere,
 };
 use tweenray::stats::RayCounts;
 use tweenray::verify::{Check, Class};
@@ -136,6 +137,26 @@ fn glass_shows_what_is_behind_holes() {
     assert!(hold(job, 1e-4, |dir| seen(eye, dir)) > 0.99);
 }
 
+#[test]
+fn a_thin_pane_has_holes() {
+    let eye = DVec3::new(0.1, -0.2, 2.0);
+    for roughness in [0.0, 0.3] {
+        let mut world = card_before_a_wall();
+        // Of air's index of refraction, so that nothing is reflected.
+        let tint = Rgb::splat(0.25);
+        let pane = Glass { tint, roughness, thin: true, ..Glass::clear(1.0) };
+        world.materials[0].glass = Some(pane);
+        let job = job(world, pose(eye.into(), (0.0, 0.0, -2.0)), 96, 96);
+        // A rough pane scatters light of the lamp, with noise: its holes alone are held.
+        let unsure = |(light, off): (f32, f64)| match (light, roughness) {
+            (1.0, _) => (1.0, off),
+            (_, 0.0) => (0.25, off),
+            _ => (0.25, 0.0),
+        };
+        assert!(hold(job, 1e-6, |dir| unsure(seen(eye, dir))) > 0.6);
+    }
+}
+
 /// A white floor, a card at half the lamp's height, and a camera that looks at the floor below it.
 fn card_above_a_floor(light: Light) -> Job {
     let mut world = World::default();
@@ -155,9 +176,22 @@ fn card_above_a_floor(light: Light) -> Job {
 
 #[test]
 fn light_falls_through_holes() {
+    light_falls_through_holes_and(0.0, None);
+}
+
+#[test]
+fn light_that_goes_straight_through_a_thin_pane_is_whole_where_it_has_holes() {
+    let pane = Glass { tint: Rgb::splat(0.25), thin: true, ..Glass::clear(1.0) };
+    light_falls_through_holes_and(0.25, Some(pane));
+}
+
+/// Holds the floor below a card of this glass, or a black one, which lets the share `passed` of light through.
+fn light_falls_through_holes_and(passed: f32, glass: Option<Glass>) {
     let lamp = DVec3::new(0.0, 4.0, 0.0);
     let light = PointLight { position: lamp, intensity: Rgb::splat(16.0) };
-    let job = card_above_a_floor(Light::Point(light));
+    let mut job = card_above_a_floor(Light::Point(light));
+    job.world.materials[0].glass = glass;
+    job.settings.glass_shadows = GlassShadows::Straight;
     let eye = job.camera.eye;
     let held = hold(job, 1e-4, |dir| {
         if dir.y > -0.1 {
@@ -174,7 +208,8 @@ fn light_falls_through_holes() {
         let to_lamp = lamp - p;
         let lit = 16.0 * to_lamp.normalize().y / to_lamp.length_squared();
         let light = lit / std::f64::consts::PI;
-        (if rim > 0.0 && there { 0.0 } else { light as f32 }, off.min(rim.abs()))
+        let share = if rim > 0.0 && there { passed } else { 1.0 };
+        (share * light as f32, off.min(rim.abs()))
     });
     assert!(held > 0.5, "{held}");
 }

@@ -7,7 +7,7 @@ use crate::error::{Error, Result};
 use crate::math::Rgb;
 
 impl World {
-    /// Refuses indices of materials, textures, masks and vertices that there are not, glass with cut-outs, thin glass with an inside, and lights and
+    /// Refuses indices of materials, textures, masks and vertices that there are not, bodies of glass with cut-outs, thin glass with an inside, and lights and
     /// spheres whose place is no number: no bounds would hold them. (The numbers of meshes are finite by
     /// invariant.)
     pub(super) fn check(&self) -> Result<()> {
@@ -64,7 +64,7 @@ impl World {
                 format!("the mask `{mask}` of {width} x {height} texels has {count} of them");
             return Err(Error::Usage(message));
         }
-        if material.glass.is_some() {
+        if material.glass.is_some_and(|glass| !glass.thin) {
             let message = format!(
                 "`{name}` is glass with cut-outs: a body of glass is closed, and a hole would leave it open"
             );
@@ -205,8 +205,13 @@ mod tests {
         assert!(refusal(leaf.clone(), vec![]).contains("`leaf` has the mask 0"));
         let short = AlphaMask { texels: vec![0; 3], ..mask.clone() };
         assert!(refusal(leaf, vec![short]).contains("`m` of 2 x 2 texels has 3"));
-        let pane = Material { alpha: Some(TextureMap::of(0)), ..Material::glass("pane", 1.5) };
-        assert!(refusal(pane, vec![mask]).contains("`pane` is glass with cut-outs"));
+        let body = Material { alpha: Some(TextureMap::of(0)), ..Material::glass("body", 1.5) };
+        assert!(
+            refusal(body.clone(), vec![mask.clone()]).contains("`body` is glass with cut-outs")
+        );
+        let pane = Material { glass: Some(Glass { thin: true, ..Glass::clear(1.5) }), ..body };
+        let world = World { materials: vec![pane], masks: vec![mask], ..World::default() };
+        assert!(world.into_scene(true).is_ok());
         let ranked = Glass { priority: Some(1), ..Glass::clear(1.5) };
         let of = |glass| Material { glass: Some(glass), ..Material::black("pane") };
         let pane = Glass { thin: true, ..ranked };

@@ -425,3 +425,29 @@ fn an_image_of_codes_that_is_base_colour_and_emission_is_one_texture() {
     let model = file.model();
     assert!(model.world.textures.len() == 1 && model.warnings.is_empty());
 }
+
+#[test]
+fn thin_glass_has_the_cut_outs_of_a_mask_and_a_body_has_none() {
+    let of = |mode: &str, thickness: f64| {
+        let mut file = File::triangle().with_uvs();
+        let texels = [[255, 255, 255, 255], [255, 255, 255, 0]];
+        let info = json!({"index": file.image(2, &texels, json!({}))});
+        let model = file.with_material(json!({
+            "alphaMode": mode,
+            "pbrMetallicRoughness": {"baseColorTexture": info, "metallicFactor": 0},
+            "extensions": {
+                "KHR_materials_transmission": {"transmissionFactor": 1},
+                "KHR_materials_volume": {"thicknessFactor": thickness},
+            },
+        }));
+        let model = model.model();
+        let material = &model.world.materials[0];
+        let is_cut = (material.glass.is_some_and(|glass| glass.thin), material.alpha.is_some());
+        let says = warns(&model.warnings, "a body of glass has no cut-outs");
+        assert!(model.world.into_scene(true).is_ok());
+        (is_cut, says)
+    };
+    assert_eq!(of("MASK", 0.0), ((true, true), false));
+    assert_eq!(of("BLEND", 0.0), ((true, false), false));
+    assert_eq!(of("MASK", 1.0), ((false, false), true));
+}

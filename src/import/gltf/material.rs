@@ -219,6 +219,12 @@ impl Parts<'_, '_> {
             material.alpha = self.mask(alpha, cutoff)?;
         }
         if let Some((glass, transmission)) = self.glass(base, pbr.as_ref())? {
+            // Beside glass BLEND is for programs that know no transmission.
+            let is_mask = self.json.text("alphaMode")? == Some("MASK");
+            if !glass.thin && is_mask && material.alpha.is_some() {
+                self.notes.add("alphaMode MASK of what has KHR_materials_volume is left out: a body of glass has no cut-outs", None);
+            }
+            material.alpha = material.alpha.filter(|_| glass.thin && is_mask);
             material = part_glass(material, glass, transmission);
         }
         Ok(Surfaced { material, is_invisible })
@@ -411,14 +417,15 @@ impl Parts<'_, '_> {
 /// `material` of which `transmission` is `glass`: where nothing else is, glass alone.
 fn part_glass(material: Material, glass: Glass, transmission: f64) -> Material {
     let glass = Some(glass);
-    let Material { emission, emission_map, emits_back, .. } = material;
+    let Material { alpha, emission, emission_map, emits_back, .. } = material;
     let name = material.name.clone();
-    let alone = Material { glass, emission, emission_map, emits_back, ..Material::black(name) };
+    let alone =
+        Material { glass, alpha, emission, emission_map, emits_back, ..Material::black(name) };
     let Some(fresnel) = material.fresnel else { return alone };
     let is_alone = transmission == 1.0 && fresnel.metallic == 0.0 && fresnel.clearcoat == 0.0;
     if is_alone && !material.has_image() && !material.vertex_colours {
         return alone;
     }
     let fresnel = Some(Fresnel { transmission, ..fresnel });
-    Material { glass, fresnel, alpha: None, ..material }
+    Material { glass, fresnel, ..material }
 }

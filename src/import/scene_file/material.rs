@@ -34,7 +34,7 @@ pub(super) struct Material {
     pub vertex_colours: bool,
     /// Image file, relative to the scene file, of cut-outs such as leaves and fences: where it is below a half,
     /// the surface is not there. Its alpha channel counts if that is not opaque all over, else the mean of its
-    /// colours, as stored. Or a table of the file and how it lies on the surface. Not on glass.
+    /// colours, as stored. Or a table of the file and how it lies on the surface. Of glass, thin panes alone.
     pub alpha: Option<At<NamedTexture>>,
     /// Reflectance of a mirror, linear RGB or one number for grey. Absent: 0.
     pub mirror: Option<At<Reflectance>>,
@@ -181,8 +181,8 @@ impl Material {
             Some(_) if principled.thin => {
                 "`absorption` is of a body, and a thin pane has no inside"
             }
-            _ if is_glass && self.alpha.is_some() => {
-                "what has a `transmission` has no cut-outs: its body is closed, and a hole would leave it open"
+            _ if is_glass && self.alpha.is_some() && !principled.thin => {
+                "what has a `transmission` has no cut-outs: its body is closed, and a hole would leave it open; a thin pane may have some"
             }
             _ if is_glass
                 && (self.normal_map.is_some() || principled.clearcoat_normal_map.is_some()) =>
@@ -233,9 +233,8 @@ impl Material {
                 let message = "glass with a `priority` is polished: it has no `roughness`";
                 return Err(source.fault(&priority.span, message).into());
             }
-            if let Some(alpha) = &self.alpha {
-                let message =
-                    "glass has no cut-outs: its body is closed, and a hole would leave it open";
+            if let Some(alpha) = self.alpha.as_ref().filter(|_| !glass.thin) {
+                let message = "glass has no cut-outs: its body is closed, and a hole would leave it open; a thin pane may have some";
                 return Err(source.fault(&alpha.span, message).into());
             }
             if let Some(map) = &self.normal_map {

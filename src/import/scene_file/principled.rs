@@ -45,7 +45,7 @@ pub(super) struct Principled {
     /// smooth as the mesh, whatever `normal_map` says of what lies under it.
     pub clearcoat_normal_map: Option<At<Named<NormalTexture>>>,
     /// Share of what is no metal that is glass of this `ior` and `roughness`, in place of the diffuse part and its reflection.
-    /// Or an image file of it, whose red counts as it stands; or a table. No normal map and no `alpha` stands beside it. Absent: 0.
+    /// Or an image file of it, whose red counts as it stands; or a table. No normal map stands beside it, and `alpha` only if it is thin. Absent: 0.
     pub transmission: Option<At<MappedShare>>,
     /// Share of light that each crossing of the glass lets through: twice of a body, once of a thin pane. `base_texture` and
     /// vertex colours multiply it. Absent: `base_colour`.

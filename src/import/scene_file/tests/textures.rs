@@ -246,11 +246,17 @@ fn what_emits_and_has_cut_outs_is_no_light() {
 }
 
 #[test]
-fn glass_with_alpha_is_refused_at_the_key() {
-    let error = cut("[material.pane]\nglass = {}\nalpha = 'leaf.pgm'\n").expect_err("refused");
-    let Error::Input(fault) = error else { panic!("{error}") };
-    assert_eq!(fault.line, Some(4));
-    assert!(fault.message.contains("glass has no cut-outs"), "{fault}");
+fn alpha_is_refused_at_the_key_of_a_body_of_glass_and_taken_of_a_thin_pane() {
+    let of = |glass: &str| cut(&format!("[material.pane]\n{glass}\nalpha = 'leaf.pgm'\n"));
+    for (body, line) in [("glass = {}", 4), ("principled = { transmission = 1 }", 3)] {
+        let Err(Error::Input(fault)) = of(body) else { panic!("{body} is taken") };
+        assert_eq!(fault.line, Some(line));
+        assert!(fault.message.contains("no cut-outs: its body is closed"), "{fault}");
+    }
+    for pane in ["glass = { thin = true }", "principled = { transmission = 1, thin = true }"] {
+        let loaded = of(pane).unwrap_or_else(|error| panic!("{error}"));
+        assert!(loaded.world.materials.iter().any(|m| m.glass.is_some() && m.alpha.is_some()));
+    }
 }
 
 /// Loads a scene file with `text` beside images of one pixel: `grey.pgm`, of 16 bits, `rgba.png` and the normal `blue.png`.
