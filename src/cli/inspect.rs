@@ -129,6 +129,8 @@ pub fn run(args: &InspectArgs) -> Result<Exit> {
 fn inspect(args: &InspectArgs) -> Result<Inspection> {
     let loaded = job::load(&args.scene, &args.settings)?;
     let Loaded { world, shot, settings, warnings, stage, repeats, .. } = loaded;
+    // The scene gives each lamp a material of its own, and the floor that is added has one.
+    let materials = world.materials.len() - usize::from(stage.is_some());
     let scene = world.into_scene(settings.rules.recentre)?;
     let intersector = intersect::build(&scene, &settings, cluster::default_threads())?;
     let mut warnings: Vec<String> = warnings.iter().map(ToString::to_string).collect();
@@ -145,8 +147,7 @@ fn inspect(args: &InspectArgs) -> Result<Inspection> {
         vertices: meshes.iter().map(|m| m.vertex_count).sum(),
         meshes: meshes.len(),
         spheres: scene.spheres.len(),
-        // Floor and lamp have one each.
-        materials: scene.materials.len() - if stage.is_some() { 2 } else { 0 },
+        materials,
         textures: scene.textures.len(),
         masks: scene.masks.len(),
         adds_floor_and_lamp: stage.is_some(),

@@ -118,6 +118,16 @@ fn inspect_of_a_bare_mesh_gives_its_own_figures() {
 }
 
 #[test]
+fn inspect_counts_no_materials_of_lamps() {
+    let job = Job::new();
+    let quad =
+        "[[light]]\nquad = { centre = [0, 9, 0], normal = '-y', size = [1, 1], radiance = 9 }\n";
+    boxed(&job, "[0, 2, 9]", "[0, 0, 0]", &quad.repeat(2));
+    let json = inspected(&job);
+    assert_eq!((&json["materials"], &json["lights"]["quad"]), (&1.into(), &2.into()));
+}
+
+#[test]
 fn convert_makes_the_folder_and_names_the_target() {
     let job = Job::new();
     job.done("convert cube.obj new/folder/b.ply");
