@@ -100,7 +100,7 @@ fn colours_of_every_type_are_interpolated_as_light() {
     std::fs::write(at("words.ply"), ply("ushort", |c| (257 * u32::from(c)).to_string())).unwrap();
     std::fs::write(at("floats.ply"), ply("float", |c| (f64::from(c) / 255.0).to_string())).unwrap();
     std::fs::write(at("square.obj"), obj()).unwrap();
-    convert(&at("square.obj"), &at("converted.ply")).unwrap();
+    convert(&at("square.obj"), &at("converted.ply"), None).unwrap();
     let files = ["bytes.ply", "ints.ply", "words.ply", "floats.ply", "square.obj", "converted.ply"];
     for file in files {
         // Far from the origin, and back.
@@ -126,7 +126,7 @@ fn finer_colours_stay_fine() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("fine.ply");
     std::fs::write(&path, ply("float", |c| ((f64::from(c) + 0.4) / 256.0).to_string())).unwrap();
-    convert(&path, &folder.path().join("again.ply")).unwrap();
+    convert(&path, &folder.path().join("again.ply"), None).unwrap();
     for file in ["fine.ply", "again.ply"] {
         let (world, _) = world_of(folder.path(), file, "");
         let colours = world.meshes[0].colours.as_ref().unwrap();

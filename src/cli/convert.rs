@@ -1,9 +1,10 @@
 //! `tweenray convert`: a mesh in another format.
 
 use super::exit::{Exit, as_input};
-use super::say;
+use super::{say, values};
 use crate::error::{Error, Result};
 use crate::import;
+use crate::scene::limits;
 use clap::Args;
 use std::path::PathBuf;
 
@@ -11,7 +12,8 @@ use std::path::PathBuf;
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
-  tweenray convert bunny.obj bunny.ply")]
+  tweenray convert bunny.obj bunny.ply
+  tweenray convert figure.glb figure.ply --time 1.5")]
 pub struct ConvertArgs {
     /// The mesh to read (.obj, .ply, .glb, .gltf)
     #[arg(value_name = "FROM")]
@@ -19,11 +21,14 @@ pub struct ConvertArgs {
     /// The file to write (.ply); replaced where it exists
     #[arg(value_name = "TO")]
     to: PathBuf,
+    /// Time at which animated meshes of a glTF file stand, seconds [default: 0]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = values::within(limits::TIME))]
+    time: Option<f64>,
 }
 
 /// Runs the command.
 pub fn run(args: &ConvertArgs) -> Result<Exit> {
-    let report = import::convert(&args.from, &args.to).map_err(|e| match e {
+    let report = import::convert(&args.from, &args.to, args.time).map_err(|e| match e {
         Error::Io { ref path, .. } if *path == args.to => e,
         other => as_input(other),
     })?;

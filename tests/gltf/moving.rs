@@ -41,6 +41,26 @@ fn morph_targets_are_added_by_the_weights_of_the_moment() {
 }
 
 #[test]
+fn a_conversion_takes_the_mesh_as_it_stands_at_a_time() {
+    let mut file = File::triangle();
+    let up = file.floats("VEC3", &[0., 0., 1., 0., 0., 1., 0., 0., 1.]);
+    file.primitive()["targets"] = json!([{"POSITION": up}]);
+    let (times, weights) = (file.floats("SCALAR", &[0., 2.]), file.floats("SCALAR", &[1., 5.]));
+    file.json["animations"] = json!([{
+        "channels": [{"sampler": 0, "target": {"node": 0, "path": "weights"}}],
+        "samplers": [{"input": times, "output": weights}],
+    }]);
+    let written = file.written();
+    for (time, z) in [(None, 1.0), (Some(0.5), 2.0), (Some(9.0), 5.0)] {
+        let ply = written.path.with_file_name("out.ply");
+        let report = tweenray::import::convert(&written.path, &ply, time).expect("converted");
+        assert!(warns(&report.warnings, &format!("at {} s (--time)", time.unwrap_or(0.0))));
+        let world = super::build::model(&ply).expect("read back").world;
+        assert_eq!(world.meshes[0].positions[0], DVec3::Z * z);
+    }
+}
+
+#[test]
 fn a_skin_moves_vertices_with_their_joints_and_not_with_its_node() {
     let mut file = File::triangle();
     let joints = file.accessor("VEC4", U8, 3, &[0, 1, 0, 0, 0, 1, 0, 0, 1, 0, 0, 0]);

@@ -8,8 +8,8 @@ mod write_ply;
 
 pub use write_ply::{PlyReport, write_ply};
 
-use super::ModelOptions;
 use super::mesh_file::read_model;
+use super::{ModelOptions, gltf};
 use crate::error::{Diagnostic, Error, Result};
 use std::fs;
 use std::io::{self, Write};
@@ -24,18 +24,23 @@ pub struct ConvertReport {
     pub warnings: Vec<Diagnostic>,
 }
 
-/// Reads the mesh file `input` and writes `output`, whose ending must be `.ply`.
+/// Reads the mesh file `input` and writes `output`, whose ending must be `.ply`. Animated meshes of a glTF file stand as at
+/// `time`, seconds; `None`: 0.
 ///
 /// Normals and vertex colours are the input's, or none: none are computed. Materials, textures and lights have no
 /// place in a PLY file and are left out with a warning.
 ///
-/// Errors: those of [`super::load_model`], `Error::Usage` for another ending, `Error::Io`.
-pub fn convert(input: &Path, output: &Path) -> Result<ConvertReport> {
+/// Errors: those of [`super::load_model`], `Error::Usage` for another ending and for a time of another format, `Error::Io`.
+pub fn convert(input: &Path, output: &Path, time: Option<f64>) -> Result<ConvertReport> {
     if !output.extension().is_some_and(|e| e.eq_ignore_ascii_case("ply")) {
         let name = output.display();
         return Err(Error::Usage(format!("cannot write {name}: meshes are written as .ply only")));
     }
-    let model = read_model(input, &ModelOptions::default())?;
+    if time.is_some() && !gltf::is_named(input) {
+        return Err(Error::Usage("`--time` is for glTF files, .glb and .gltf".into()));
+    }
+    let usual = ModelOptions::default();
+    let model = read_model(input, &ModelOptions { time: time.unwrap_or(usual.time), ..usual })?;
     let mut warnings = model.warnings;
     let world = model.world;
     let mut lost = Vec::new();

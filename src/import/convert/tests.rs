@@ -9,7 +9,7 @@ fn obj_to_ply(text: &str) -> (ConvertReport, World) {
     let folder = tempfile::tempdir().expect("a folder");
     let (obj, ply) = (folder.path().join("a.obj"), folder.path().join("b.PLY"));
     std::fs::write(&obj, text).expect("written");
-    let report = convert(&obj, &ply).expect("converted");
+    let report = convert(&obj, &ply, None).expect("converted");
     let size = std::fs::metadata(&ply).expect("there").len();
     assert_eq!(report.written.bytes, size);
     let files = std::fs::read_dir(folder.path()).expect("listed").count();
@@ -73,8 +73,12 @@ fn meshes_with_and_without_normals_go_together() {
 #[test]
 fn other_endings_and_unwritable_places_are_errors() {
     let input = Path::new("/nowhere/a.obj");
-    assert!(matches!(convert(input, Path::new("b.obj")), Err(Error::Usage(_))));
-    assert!(matches!(convert(input, Path::new("b.ply")), Err(Error::Io { action: "read", .. })));
+    assert!(matches!(convert(input, Path::new("b.obj"), None), Err(Error::Usage(_))));
+    assert!(matches!(
+        convert(input, Path::new("b.ply"), None),
+        Err(Error::Io { action: "read", .. })
+    ));
+    assert!(matches!(convert(input, Path::new("b.ply"), Some(1.0)), Err(Error::Usage(_))));
     let file = tempfile::NamedTempFile::new().expect("a file");
     let below = file.path().join("b.ply");
     let error = write_atomically(&below, |_| Ok(())).expect_err("a file is no folder");
