@@ -33,7 +33,8 @@ pub use convert::{ConvertReport, PlyReport, convert, write_ply};
 pub use generators::{MAX_TRIANGLES, bench_terrain, terrain_height, uv_sphere};
 pub use mesh_file::{load_model, load_model_with};
 pub use model::{
-    COLOURED_MATERIAL, DEFAULT_ALBEDO, DEFAULT_MATERIAL, FileCamera, Model, ModelOptions, Repeats,
+    COLOURED_MATERIAL, CameraChoice, DEFAULT_ALBEDO, DEFAULT_MATERIAL, FileCamera, Model,
+    ModelOptions, Repeats,
 };
 pub use normals::apply as apply_normals;
 pub use scene_file::schema;
@@ -66,8 +67,8 @@ pub struct LoadOptions {
 
 impl Default for LoadOptions {
     fn default() -> Self {
-        let ModelOptions { camera, fps, .. } = ModelOptions::default();
-        Self { up: UpAxis::Y, scale: 1.0, size: None, camera, time: None, fps }
+        let fps = ModelOptions::default().fps;
+        Self { up: UpAxis::Y, scale: 1.0, size: None, camera: None, time: None, fps }
     }
 }
 

@@ -60,11 +60,23 @@ pub(super) fn traced_bytes(mesh: &WorldMesh) -> u64 {
     12 * vertices + 12 * mesh.triangles.len() as u64 + normals + uvs + colours
 }
 
+/// Which camera of a mesh file is wanted.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub enum CameraChoice {
+    /// The first that can be rendered.
+    #[default]
+    First,
+    /// The one of this name or number.
+    Named(String),
+    /// None: what is wrong with cameras does not matter.
+    Unwanted,
+}
+
 /// What of a mesh file is wanted that holds more than one camera or moment.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModelOptions {
-    /// Name or number of the camera; `None`: the first with a perspective.
-    pub camera: Option<String>,
+    /// Which camera is wanted.
+    pub camera: CameraChoice,
     /// Time at which animated meshes and lights stand, seconds.
     pub time: f64,
     /// Frames a second of the camera's move.
@@ -73,7 +85,14 @@ pub struct ModelOptions {
 
 impl Default for ModelOptions {
     fn default() -> Self {
-        Self { camera: None, time: 0.0, fps: 24.0 }
+        Self { camera: CameraChoice::First, time: 0.0, fps: 24.0 }
+    }
+}
+
+impl ModelOptions {
+    /// Of a file that gives its meshes alone.
+    pub(super) fn without_camera() -> Self {
+        Self { camera: CameraChoice::Unwanted, ..Self::default() }
     }
 }
 

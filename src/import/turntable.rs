@@ -8,7 +8,8 @@
 use super::framing::{self, Lens};
 use super::scene_file::to_y_up;
 use super::{
-    AddedStage, FileCamera, LoadOptions, Loaded, Model, ModelOptions, emission, untextured,
+    AddedStage, CameraChoice, FileCamera, LoadOptions, Loaded, Model, ModelOptions, emission,
+    untextured,
 };
 use crate::error::{Diagnostic, Result};
 use crate::math::{DAffine3, DVec3, Rgb};
@@ -46,7 +47,7 @@ fn key_direction() -> DVec3 {
 pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Loaded> {
     let policy = NormalPolicy::Auto { crease_degrees: super::DEFAULT_CREASE_DEGREES };
     let of_file = ModelOptions {
-        camera: options.camera.clone(),
+        camera: options.camera.clone().map_or(CameraChoice::First, CameraChoice::Named),
         time: options.time.unwrap_or(0.0),
         fps: options.fps,
     };

@@ -449,7 +449,8 @@ fn animations_and_lenses_that_make_no_sense_are_refused() {
     let lens = |yfov: Value| changed_in(file.clone(), "/cameras/0/perspective/yfov", yfov);
     assert_eq!(
         lens(json!(4)),
-        "cameras[0].perspective.yfov: a vertical field of view lies between 0 and pi, radians"
+        "the camera `camera 0` cannot be rendered: cameras[0].perspective.yfov: \
+         a vertical field of view lies between 0 and pi, radians"
     );
     let mut flat = file.clone();
     flat.json["nodes"][0]["scale"] = json!([1, 1, 0]);

@@ -1,6 +1,6 @@
 //! The file's own camera, and its moves.
 
-use super::build::{File, warns};
+use super::build::{File, Written, warns};
 use serde_json::{Value, json};
 use tweenray::import::{LoadOptions, Loaded};
 use tweenray::math::DVec3;
@@ -268,4 +268,62 @@ fn camera_and_time_are_for_gltf_alone() {
             assert_eq!(refused, "`--camera` and `--time` are for glTF files, .glb and .gltf");
         }
     }
+}
+
+/// [`filmed`] with a third camera `c` on node `high` at (0, 9, 0), and `yfov` for that of `a`.
+fn filmed_twice(yfov: Value) -> File {
+    let mut file = filmed();
+    let lens = json!({"yfov": 1, "znear": -1});
+    let camera =
+        file.add("cameras", json!({"name": "c", "type": "perspective", "perspective": lens}));
+    file.add("nodes", json!({"camera": camera, "name": "high", "translation": [0, 9, 0]}));
+    file.json["cameras"][0]["perspective"]["yfov"] = yfov;
+    file
+}
+
+#[test]
+fn a_camera_that_cannot_be_rendered_is_left_out_with_a_warning_unless_it_is_chosen() {
+    let faulty = "the camera `a` cannot be rendered: cameras[0].perspective.yfov: ";
+    for (yfov, fault) in [
+        (json!(0), "a vertical field of view lies between 0 and pi, radians"),
+        (json!(null), "expected a number, found null"),
+        (json!("wide"), "expected a number, found a text"),
+    ] {
+        let file = filmed_twice(yfov);
+        let loaded = file.loaded();
+        assert_eq!(eye(&loaded, 1), DVec3::Y * 9.0);
+        let warning = format!("{faulty}{fault}: it is left out");
+        assert!(warns(&loaded.warnings, &warning), "{:?}", loaded.warnings);
+        let chosen = LoadOptions { camera: Some("a".into()), ..LoadOptions::default() };
+        let error = file.written().load(&chosen).expect_err("refused").to_string();
+        assert!(error.contains(&format!("{faulty}{fault}")), "{error}");
+        let other = LoadOptions { camera: Some("c".into()), ..LoadOptions::default() };
+        assert!(warns(&file.loaded_with(&other).warnings, &warning));
+    }
+    assert!(!warns(&filmed_twice(json!(YFOV)).loaded().warnings, "left out"));
+}
+
+#[test]
+fn where_no_camera_can_be_rendered_the_first_says_why() {
+    let mut file = filmed_twice(json!(4));
+    file.json["cameras"][2]["perspective"] = json!({"yfov": 1, "aspectRatio": 0});
+    let error = file.written().load(&LoadOptions::default()).expect_err("refused").to_string();
+    assert!(error.contains("the camera `a` cannot be rendered: "), "{error}");
+    let chosen = LoadOptions { camera: Some("c".into()), ..LoadOptions::default() };
+    let error = file.written().load(&chosen).expect_err("refused").to_string();
+    let fault =
+        "the camera `c` cannot be rendered: cameras[2].perspective.aspectRatio: 0 is out of range";
+    assert!(error.contains(fault), "{error}");
+}
+
+#[test]
+fn a_scene_file_and_a_conversion_take_no_camera_and_none_of_its_faults() {
+    let glb = filmed_twice(json!(0));
+    let scene = Written::of("scene.toml", b"[[mesh]]\nfile = 'part.glb'\n[sky]\nradiance = 1\n");
+    scene.beside("part.glb", &glb.glb());
+    let loaded = scene.load(&LoadOptions::default()).expect("a scene");
+    assert!(loaded.warnings.is_empty(), "{:?}", loaded.warnings);
+    let from = scene.path.with_file_name("part.glb");
+    let report = tweenray::import::convert(&from, &scene.path.with_file_name("part.ply"), None);
+    assert_eq!(report.expect("converted").written.triangles, 1);
 }

@@ -39,7 +39,7 @@ pub fn convert(input: &Path, output: &Path, time: Option<f64>) -> Result<Convert
     if time.is_some() && !gltf::is_named(input) {
         return Err(Error::Usage("`--time` is for glTF files, .glb and .gltf".into()));
     }
-    let usual = ModelOptions::default();
+    let usual = ModelOptions::without_camera();
     let model = read_model(input, &ModelOptions { time: time.unwrap_or(usual.time), ..usual })?;
     let mut warnings = model.warnings;
     let world = model.world;

@@ -6,8 +6,8 @@ use super::json::Json;
 use super::node::{Nodes, name_of};
 use super::place::LARGEST;
 use super::uri::shortened;
-use crate::error::{Diagnostic, Result, counted};
-use crate::import::model::{FileCamera, ModelOptions};
+use crate::error::{Diagnostic, Error, Result, counted};
+use crate::import::model::{CameraChoice, FileCamera, ModelOptions};
 use crate::import::source::Notes;
 use crate::math::{DAffine3, DVec3};
 use crate::scene::{CameraPath, Easing, FramePose, Pose, Shot, ShotLens};
@@ -17,7 +17,7 @@ use std::f64::consts::PI;
 const MOST_FRAMES: f64 = 100_000.0;
 /// Most frames times moving nodes between the camera and the scene.
 const MOST_STEPS: f64 = 1e7;
-/// Most cameras that an error lists.
+/// Most cameras that an error lists, or that are named in warnings.
 const MOST_NAMES: usize = 30;
 /// A key this share of a frame after the last one still gets a frame: times are rounded to f32.
 const SLACK: f64 = 0.01;
@@ -32,9 +32,18 @@ struct Placed<'d> {
     camera_name: String,
 }
 
-/// The camera that `options` name, or the first one with a perspective, and its move. `None` where there is none.
+/// What a camera says of its lens.
+struct FileLens {
+    /// Radians.
+    vfov: f64,
+    /// Width of its image over the height.
+    aspect: Option<f64>,
+}
+
+/// The camera that `options` name, or the first one whose lens can be rendered, and its move. `None` where there is none.
 ///
-/// Errors: a name that is not there, an orthographic camera that is named, a move of too many frames, lenses out of range.
+/// Errors: a name that is not there, a camera that is named or the only one and whose lens cannot be rendered, a move of too
+/// many frames or out of range.
 pub(super) fn read(
     document: &Document<'_>,
     nodes: &Nodes,
@@ -43,24 +52,9 @@ pub(super) fn read(
     notes: &mut Notes,
 ) -> Result<Option<FileCamera>> {
     let all = placed(document, nodes)?;
-    let Some(camera) = choose(document, &all, options, notes)? else { return Ok(None) };
-    let Some(lens) = camera.json.get("perspective") else {
-        let message = format!(
-            "the camera `{}` is orthographic, which cannot be rendered",
-            camera.camera_name
-        );
-        let help = "give it a perspective in the program that wrote the file, or choose another by --camera";
-        return Err(camera.json.fault(message).help(help).into());
-    };
-    let vfov = lens.required("yfov")?;
-    let vfov = lens
-        .number("yfov")?
-        .filter(|angle| (1e-6..PI).contains(angle))
-        .ok_or_else(|| vfov.fault("a vertical field of view lies between 0 and pi, radians"))?;
-    let aspect = match lens.get("aspectRatio") {
-        Some(_) => Some(lens.number_within("aspectRatio", [1e-3, 1e3], 1.0)?),
-        None => None,
-    };
+    let Some(camera) = choose(document, &all, &options.camera, notes)? else { return Ok(None) };
+    let FileLens { vfov, aspect } = camera.lens()?;
+    note_faulty(&all, camera, notes);
     let rig = Rig::of(camera, nodes, animations);
     let frames = rig.frames(document, options)?;
     let shot = Shot {
@@ -72,6 +66,52 @@ pub(super) fn read(
         lens: ShotLens::Pinhole,
     };
     Ok(Some(FileCamera { shot, aspect }))
+}
+
+impl Placed<'_> {
+    fn is_perspective(&self) -> bool {
+        self.json.get("perspective").is_some()
+    }
+
+    /// Errors: a lens that cannot be rendered, by the camera's name.
+    fn lens(&self) -> Result<FileLens> {
+        let name = &self.camera_name;
+        let Some(lens) = self.json.get("perspective") else {
+            let message = format!("the camera `{name}` is orthographic, which cannot be rendered");
+            let help = "give it a perspective in the program that wrote the file, or choose another by --camera";
+            return Err(self.json.fault(message).help(help).into());
+        };
+        lens_of(&lens).map_err(|error| match error {
+            Error::Input(fault) => {
+                let message = format!("the camera `{name}` cannot be rendered: {}", fault.message);
+                Diagnostic { message, ..*fault }.into()
+            }
+            other => other,
+        })
+    }
+}
+
+fn lens_of(perspective: &Json<'_>) -> Result<FileLens> {
+    let vfov = perspective.required("yfov")?;
+    let vfov = perspective
+        .number("yfov")?
+        .filter(|angle| (1e-6..PI).contains(angle))
+        .ok_or_else(|| vfov.fault("a vertical field of view lies between 0 and pi, radians"))?;
+    let aspect = match perspective.get("aspectRatio") {
+        Some(_) => Some(perspective.number_within("aspectRatio", [1e-3, 1e3], 1.0)?),
+        None => None,
+    };
+    Ok(FileLens { vfov, aspect })
+}
+
+/// Names the cameras with a perspective, other than the one that is `used`, whose lens cannot be rendered: the first of them.
+fn note_faulty(all: &[Placed<'_>], used: &Placed<'_>, notes: &mut Notes) {
+    let others = all.iter().filter(|other| other.camera != used.camera && other.is_perspective());
+    for error in others.filter_map(|other| other.lens().err()).take(MOST_NAMES) {
+        if let Error::Input(fault) = error {
+            notes.add(&format!("{}: it is left out", fault.message), None);
+        }
+    }
 }
 
 /// All cameras of the scene, in the order of its nodes.
@@ -96,17 +136,24 @@ fn placed<'d>(document: &Document<'d>, nodes: &Nodes) -> Result<Vec<Placed<'d>>>
 fn choose<'p, 'd>(
     document: &Document<'_>,
     all: &'p [Placed<'d>],
-    options: &ModelOptions,
+    choice: &CameraChoice,
     notes: &mut Notes,
 ) -> Result<Option<&'p Placed<'d>>> {
-    let Some(wanted) = &options.camera else {
-        let first = all.iter().find(|camera| camera.json.get("perspective").is_some());
-        if let (None, Some(other)) = (first, all.first()) {
-            let name = &other.camera_name;
-            notes.add(&format!("the camera `{name}` is orthographic, which cannot be rendered: the model is shown on a turntable"), None);
+    let wanted = match choice {
+        CameraChoice::Unwanted => return Ok(None),
+        CameraChoice::First => {
+            let mut perspective = all.iter().filter(|camera| camera.is_perspective());
+            // Where none can be rendered, the first says why.
+            let first = perspective.clone().find(|camera| camera.lens().is_ok());
+            let first = first.or_else(|| perspective.next());
+            if let (None, Some(other)) = (first, all.first()) {
+                let name = &other.camera_name;
+                notes.add(&format!("the camera `{name}` is orthographic, which cannot be rendered: the model is shown on a turntable"), None);
+            }
+            note_others(document, all, first, notes)?;
+            return Ok(first);
         }
-        note_others(document, all, first, notes)?;
-        return Ok(first);
+        CameraChoice::Named(wanted) => wanted,
     };
     let by = |name: for<'c> fn(&'c Placed<'d>) -> &'c str| {
         all.iter().find(|camera| name(camera) == wanted)

@@ -253,7 +253,7 @@ impl<'a> Builder<'a> {
     ///
     /// Errors: a `time` of a file that is not glTF.
     fn model_options(&self, path: &Path, mesh: &Mesh) -> Result<ModelOptions> {
-        let usual = ModelOptions::default();
+        let usual = ModelOptions::without_camera();
         let Some(time) = &mesh.time else { return Ok(usual) };
         if !import::gltf::is_named(path) {
             return Err(self.at_span(&time.span, "`time` is for glTF files, .glb and .gltf"));
