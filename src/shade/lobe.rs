@@ -24,7 +24,7 @@ use crate::stats::RayKind;
 use boundary::Boundary;
 pub(super) use dielectric::{Dielectric, Pane};
 pub(super) use diffuse::albedo;
-use glossy::Glossy;
+use glossy::{Glossy, Microfacets};
 pub(super) use layers::Layers;
 use mirror::Mirror;
 use part_glass::{PartGlass, SmoothPart};
@@ -71,11 +71,11 @@ pub(super) fn for_each_directional<const MIRROR: bool, const GLASS: bool>(
     mut take: impl FnMut(Lobe, u32, &SurfaceInteraction),
 ) {
     let (si, wo, _) = seen;
-    if let Some(Layers { mirror, roughness, coat, glass, albedo: _ }) = layers.filter(|_| MIRROR) {
-        let coat = coat.as_ref().map(|coat| (coat.reflectance, coat.roughness, coat.si));
-        let mut over = [Some((*mirror, *roughness, si)), coat, None];
+    if let Some(Layers { mirror, facets, coat, glass, albedo: _ }) = layers.filter(|_| MIRROR) {
+        let coat = coat.as_ref().map(|coat| (coat.reflectance, &coat.facets, coat.si));
+        let mut over = [Some((*mirror, facets, si)), coat, None];
         if let Some(part) = glass.as_ref().filter(|_| GLASS) {
-            let lobes = part.lobes((*mirror, *roughness), si, wo);
+            let lobes = part.lobes((*mirror, facets), si, wo);
             // A smooth one has both directions.
             let firsts = [0, u32::from(part.glass.is_rough())];
             lobes
@@ -85,9 +85,9 @@ pub(super) fn for_each_directional<const MIRROR: bool, const GLASS: bool>(
             over = [None, None, coat];
         }
         for (first, layer) in (0..).zip(over) {
-            let Some((reflectance, roughness, si)) = layer else { continue };
+            let Some((reflectance, facets, si)) = layer else { continue };
             if reflectance != Reflectance::constant(Rgb::ZERO) {
-                take(reflecting(reflectance, roughness, facing_normal(si, wo), wo), first, si);
+                take(reflecting(reflectance, facets, facing_normal(si, wo), wo), first, si);
             }
         }
         return;
@@ -100,9 +100,9 @@ pub(super) fn for_each_directional<const MIRROR: bool, const GLASS: bool>(
                     let n = facing_normal(si, wo);
                     let factor = material.roughness;
                     let roughness = glossy::roughness(scene, (material, factor), seen);
-                    let reflectance = Reflectance::constant(material.mirror);
-                    let reflectance = reflectance.given_back(roughness, wo.dot(n));
-                    Lobe::Glossy(Glossy::new(reflectance, roughness, (n, wo.dot(n))))
+                    let facets = Microfacets::new(roughness, wo.dot(n));
+                    let reflectance = Reflectance::constant(material.mirror).given_back(&facets);
+                    Lobe::Glossy(Glossy::new(reflectance, &facets, n))
                 }
             },
             0,
@@ -159,17 +159,18 @@ fn painted_glass(
 fn rough_glass(glass: &Glass, si: &SurfaceInteraction, wo: DVec3) -> [Lobe; 2] {
     let n = facing_normal(si, wo);
     let boundary = Boundary::new(glass, si.is_outside(wo));
-    let back = part_glass::rough_share(glass, boundary, wo.dot(n));
+    let facets = Microfacets::new(glass.roughness, wo.dot(n));
+    let back = part_glass::rough_share(glass, boundary, &facets, wo.dot(n));
     let through = RoughGlass::new(boundary, glass.tint * back as f32, glass.roughness, n);
-    let reflected = Glossy::of_glass(boundary, back, glass.roughness, (n, wo.dot(n)));
+    let reflected = Glossy::of_glass(boundary, back, &facets, n);
     [Lobe::Glossy(reflected), Lobe::RoughGlass(through)]
 }
 
-/// The lobe of a mirror or coat of this roughness at the unit normal `n` on the viewer's side, seen along `wo`.
-fn reflecting(reflectance: Reflectance, roughness: f64, n: DVec3, wo: DVec3) -> Lobe {
-    match roughness {
+/// The lobe of a mirror or coat of these `facets` at the unit normal `n` on the viewer's side, seen along `wo`.
+fn reflecting(reflectance: Reflectance, facets: &Microfacets, n: DVec3, wo: DVec3) -> Lobe {
+    match facets.roughness {
         0.0 => Lobe::Mirror(Mirror::new(reflectance.at(wo.dot(n)))),
-        _ => Lobe::Glossy(Glossy::new(reflectance, roughness, (n, wo.dot(n)))),
+        _ => Lobe::Glossy(Glossy::new(reflectance, facets, n)),
     }
 }
 

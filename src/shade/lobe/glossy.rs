@@ -30,6 +30,14 @@ pub(in crate::shade) struct Glossy {
     passed: f64,
 }
 
+/// The microfacets of a surface as they are seen along one direction.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::shade) struct Microfacets {
+    pub roughness: f64,
+    /// [`reflected_shares`]; of a smooth surface those of a mirror.
+    reflected: [f64; 2],
+}
+
 /// Microfacets that are tried for one direction: of a million directions less than one takes more, at any roughness.
 const MOST_TRIES: u32 = 40;
 
@@ -57,37 +65,52 @@ enum FacetReflectance {
     Both(Reflectance, Boundary, f64),
 }
 
+impl Microfacets {
+    /// The microfacets of a surface of this `roughness`, seen along a direction of the cosine `cos`.
+    pub fn new(roughness: f64, cos: f64) -> Self {
+        let reflected = match roughness {
+            0.0 => [1.0, schlick(cos)],
+            _ => reflected_shares(roughness, cos),
+        };
+        Self { roughness, reflected }
+    }
+
+    /// The share of light that they reflect where they reflect all, light that meets a second one dropped.
+    pub(super) fn passed(&self) -> f64 {
+        self.reflected[0]
+    }
+}
+
 impl Glossy {
-    /// What a boundary of glass of this roughness reflects, times `factor`; `seen` as in [`new`](Self::new).
+    /// What a boundary of glass of these `facets` reflects, times `factor`; `n` as in [`new`](Self::new).
     pub(super) fn of_glass(
         boundary: Boundary,
         factor: f64,
-        roughness: f64,
-        seen: (DVec3, f64),
+        facets: &Microfacets,
+        n: DVec3,
     ) -> Self {
-        let mirror = Self::new(Reflectance::constant(Rgb::ZERO), roughness, seen);
+        let mirror = Self::new(Reflectance::constant(Rgb::ZERO), facets, n);
         Self { reflectance: FacetReflectance::Glass(boundary, factor), ..mirror }
     }
 
-    /// What a mirror of this `reflectance` and a boundary of glass, times a factor, reflect together, both of this roughness;
-    /// `seen` as in [`new`](Self::new).
+    /// What a mirror of this `reflectance` and a boundary of glass, times a factor, reflect together, both of these `facets`;
+    /// `n` as in [`new`](Self::new).
     pub(super) fn beside_glass(
         reflectance: Reflectance,
         (boundary, factor): (Boundary, f64),
-        roughness: f64,
-        seen: (DVec3, f64),
+        facets: &Microfacets,
+        n: DVec3,
     ) -> Self {
-        let mirror = Self::new(Reflectance::constant(Rgb::ZERO), roughness, seen);
+        let mirror = Self::new(Reflectance::constant(Rgb::ZERO), facets, n);
         Self { reflectance: FacetReflectance::Both(reflectance, boundary, factor), ..mirror }
     }
 
-    /// The lobe of microfacets of this `reflectance`, which includes what single reflection loses, at a surface of this
-    /// `roughness` with the unit normal `n` on the viewer's side, seen at the cosine `cos` to it.
-    pub fn new(reflectance: Reflectance, roughness: f64, (n, cos): (DVec3, f64)) -> Self {
-        let roughness = at_least(roughness);
+    /// The lobe of `facets` of this `reflectance`, which includes what single reflection loses, at a rough surface with the unit
+    /// normal `n` on the viewer's side.
+    pub fn new(reflectance: Reflectance, facets: &Microfacets, n: DVec3) -> Self {
+        let roughness = at_least(facets.roughness);
         let reflectance = FacetReflectance::Mirror(reflectance);
-        let [passed, _] = reflected_shares(roughness, cos);
-        Self { reflectance, alpha: roughness * roughness, n, passed }
+        Self { reflectance, alpha: roughness * roughness, n, passed: facets.passed() }
     }
 
     /// The share of irradiance from `wi` that becomes radiance towards `wo` (both unit, leaving), per steradian.
@@ -170,33 +193,25 @@ pub(super) fn roughness(
 }
 
 impl Reflectance {
-    /// The share that microfacets of this reflectance, of a surface of this `roughness`, reflect of light along a direction
-    /// of the cosine `cos`, light that meets a second one dropped.
-    pub fn single(&self, roughness: f64, cos: f64) -> Rgb {
-        let [all, grazing] = shares(roughness, cos);
+    /// The share that `facets` of this reflectance reflect of light along the direction that they are seen from, light that meets
+    /// a second one dropped.
+    pub fn single(&self, facets: &Microfacets) -> Rgb {
+        let [all, grazing] = facets.reflected.map(|share| share as f32);
         self.normal * all + self.rise * grazing
     }
 
-    /// With what single reflection loses at a surface of this `roughness`, seen along a direction of the cosine `cos`: so that
-    /// a white one reflects all of a uniform light (Turquin, 2019). Light is coloured at each reflection.
-    pub fn given_back(self, roughness: f64, cos: f64) -> Self {
-        let [all, _] = shares(roughness, cos);
+    /// With what single reflection loses at a surface of these `facets`: so that a white one reflects all of a uniform light
+    /// (Turquin, 2019). Light is coloured at each reflection.
+    pub fn given_back(self, facets: &Microfacets) -> Self {
+        let all = facets.passed() as f32;
         let factor = Rgb::ONE + self.normal * ((1.0 - all) / all);
         self.scaled(factor)
     }
 }
 
-/// [`reflected_shares`], also of a smooth surface.
-fn shares(roughness: f64, cos: f64) -> [f32; 2] {
-    match roughness {
-        0.0 => [1.0, schlick(cos) as f32],
-        _ => reflected_shares(roughness, cos).map(|share| share as f32),
-    }
-}
-
 /// The share of light from a direction of cosine `cos` that leaves a surface after one reflection: where microfacets reflect
 /// all, and where they reflect as much as [`schlick`] says.
-pub(super) fn reflected_shares(roughness: f64, cos: f64) -> [f64; 2] {
+fn reflected_shares(roughness: f64, cos: f64) -> [f64; 2] {
     static TABLE: OnceLock<ShareTable<2>> = OnceLock::new();
     let [all, grown] = TABLE.get_or_init(|| ShareTable::new(integrate)).at(roughness, cos);
     [all, grown + schlick(cos) * all]
@@ -223,7 +238,7 @@ mod tests {
     use std::f64::consts::TAU;
 
     fn lobe(roughness: f64, wo: DVec3) -> Glossy {
-        Glossy::new(Reflectance::constant(Rgb::ONE), roughness, (DVec3::Z, wo.z))
+        Glossy::new(Reflectance::constant(Rgb::ONE), &Microfacets::new(roughness, wo.z), DVec3::Z)
     }
 
     #[test]

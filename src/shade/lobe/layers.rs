@@ -1,5 +1,6 @@
 //! Layers over a diffuse part, whose reflection grows towards grazing angles, and what each leaves to those below.
 
+use super::glossy::Microfacets;
 use super::part_glass::PartGlass;
 use super::reflectance::Reflectance;
 use super::{diffuse, facing_normal, glossy};
@@ -20,7 +21,7 @@ pub(in crate::shade) struct Layers<'s> {
     pub albedo: Rgb,
     /// The mirror over it.
     pub mirror: Reflectance,
-    pub roughness: f64,
+    pub facets: Microfacets,
     /// The clear coat over both.
     pub coat: Option<Coat<'s>>,
     /// The glass beside diffuse layer and mirror, under the coat.
@@ -31,16 +32,15 @@ pub(in crate::shade) struct Layers<'s> {
 #[derive(Clone, Copy)]
 pub(in crate::shade) struct Coat<'s> {
     pub reflectance: Reflectance,
-    pub roughness: f64,
+    pub facets: Microfacets,
     /// The point, with the coat's own shading normal.
     pub si: &'s SurfaceInteraction,
 }
 
 impl Coat<'_> {
-    /// The share of light that it lets through, for a viewer along the unit vector `wo`.
-    fn passed(&self, wo: DVec3) -> f32 {
-        let cos = facing_normal(self.si, wo).dot(wo);
-        1.0 - self.reflectance.single(self.roughness, cos).x
+    /// The share of light that it lets through to the viewer.
+    fn passed(&self) -> f32 {
+        1.0 - self.reflectance.single(&self.facets).x
     }
 }
 
@@ -61,7 +61,7 @@ impl<'s> Layers<'s> {
         let specular = share(&fresnel.specular_map) as f32;
         let transmission = fresnel.transmission * share(&fresnel.transmission_map);
         let clearcoat = fresnel.clearcoat * share(&fresnel.clearcoat_map);
-        let cos = facing_normal(si, wo).dot(wo);
+        let facets = Microfacets::new(roughness, facing_normal(si, wo).dot(wo));
         let (metal, no_metal) = (metal as f32, (1.0 - metal) as f32);
         let other = no_metal * (1.0 - transmission as f32);
         let grazing = Rgb::splat(fresnel.grazing as f32);
@@ -71,26 +71,26 @@ impl<'s> Layers<'s> {
             Rgb::select(reflected.cmpgt(Rgb::ONE), Rgb::ONE, reflected)
         });
         let shine = Reflectance::growing(normal * specular, grazing * specular);
-        let shine = shine.given_back(roughness, cos);
-        let of_metal = Reflectance::growing(base, Rgb::ONE).given_back(roughness, cos);
+        let shine = shine.given_back(&facets);
+        let of_metal = Reflectance::growing(base, Rgb::ONE).given_back(&facets);
         let coat = (clearcoat != 0.0).then(|| {
             let [normal, all] = [COAT, 1.0].map(|share| Rgb::splat((clearcoat * share) as f32));
             let roughness = fresnel.clearcoat_roughness * share(&fresnel.clearcoat_roughness_map);
-            let cos = facing_normal(coated, wo).dot(wo);
-            let reflectance = Reflectance::growing(normal, all).given_back(roughness, cos);
-            Coat { reflectance, roughness, si: coated }
+            let facets = Microfacets::new(roughness, facing_normal(coated, wo).dot(wo));
+            let reflectance = Reflectance::growing(normal, all).given_back(&facets);
+            Coat { reflectance, facets, si: coated }
         });
-        let passed = coat.map_or(1.0, |coat| coat.passed(wo));
+        let passed = coat.map_or(1.0, |coat| coat.passed());
         let mirror = Reflectance {
             normal: shine.normal * other + of_metal.normal * metal,
             rise: shine.rise * other + of_metal.rise * metal,
         };
         // By the channel that most is reflected of, so that the rest is not tinted.
-        let reflected = shine.single(roughness, cos).max_element();
+        let reflected = shine.single(&facets).max_element();
         Self {
             albedo: base * (other * (1.0 - reflected) * passed),
             mirror: mirror.scaled(Rgb::splat(passed)),
-            roughness,
+            facets,
             coat,
             glass: (transmission != 0.0)
                 .then(|| super::painted_glass(scene, material, seen))

@@ -1,7 +1,7 @@
 //! Glass that is a share of a surface, beside other layers.
 
 use super::boundary::Boundary;
-use super::glossy::{self, Glossy};
+use super::glossy::{Glossy, Microfacets};
 use super::reflectance::Reflectance;
 use super::rough_glass::RoughGlass;
 use super::{Lobe, Scattered, facing_normal};
@@ -18,11 +18,11 @@ pub(in crate::shade) struct PartGlass {
 }
 
 impl PartGlass {
-    /// The glass, and the mirror of this reflectance and roughness beside it, at the point `si` seen along `wo`: what both
+    /// The glass, and the mirror of this reflectance and of these `facets` beside it, at the point `si` seen along `wo`: what both
     /// reflect is one lobe, so that it takes one ray.
     pub fn lobes(
         &self,
-        (mirror, roughness): (Reflectance, f64),
+        (mirror, facets): (Reflectance, &Microfacets),
         si: &SurfaceInteraction,
         wo: DVec3,
     ) -> [Option<Lobe>; 2] {
@@ -30,16 +30,17 @@ impl PartGlass {
         let boundary = Boundary::new(&self.glass, si.is_outside(wo));
         let cos = wo.dot(n);
         if self.glass.is_rough() {
-            let back = rough_share(&self.glass, boundary, cos);
+            let back = rough_share(&self.glass, boundary, facets, cos);
             let share = f64::from(self.share) * back;
-            let reflected = Glossy::beside_glass(mirror, (boundary, share), roughness, (n, cos));
-            let through = RoughGlass::new(boundary, self.glass.tint * share as f32, roughness, n);
+            let reflected = Glossy::beside_glass(mirror, (boundary, share), facets, n);
+            let tint = self.glass.tint * share as f32;
+            let through = RoughGlass::new(boundary, tint, facets.roughness, n);
             return [Some(Lobe::Glossy(reflected)), Some(Lobe::RoughGlass(through))];
         }
         // Glass that bends no light is smooth, whatever the mirror is.
-        let (rough, smooth) = match roughness {
+        let (rough, smooth) = match facets.roughness {
             0.0 => (None, mirror.at(cos)),
-            _ => (Some(Lobe::Glossy(Glossy::new(mirror, roughness, (n, cos)))), Rgb::ZERO),
+            _ => (Some(Lobe::Glossy(Glossy::new(mirror, facets, n))), Rgb::ZERO),
         };
         let Self { glass: Glass { tint, .. }, share } = *self;
         let part = SmoothPart { boundary, mirror: smooth, share, tint };
@@ -47,12 +48,17 @@ impl PartGlass {
     }
 }
 
-/// The factor on both lobes of rough glass that gives back what meets several microfacets, seen along a direction of the cosine
+/// The factor on both lobes of rough glass that gives back what meets several of its `facets`, seen along a direction of the cosine
 /// `cos`.
-pub(super) fn rough_share(glass: &Glass, boundary: Boundary, cos: f64) -> f64 {
+pub(super) fn rough_share(
+    glass: &Glass,
+    boundary: Boundary,
+    facets: &Microfacets,
+    cos: f64,
+) -> f64 {
     let passed = match glass.thin {
         // Light that goes through leaves as what is reflected does, but on the other side.
-        true => glossy::reflected_shares(glass.roughness, cos)[0],
+        true => facets.passed(),
         false => boundary.passed(glass.roughness, cos),
     };
     1.0 / passed
