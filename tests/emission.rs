@@ -8,7 +8,8 @@ use common::{Job, job, mean, pose, render, render_scene};
 use tweenray::film::Film;
 use tweenray::math::{DVec3, Rgb, Vec2};
 use tweenray::scene::{
-    Corners, IntersectorKind, Light, Material, Texture, TextureMap, World, WorldMesh, Wrap,
+    AlphaMask, Corners, IntersectorKind, Light, Material, SphereLight, Texture, TextureMap, World,
+    WorldMesh, Wrap,
 };
 
 /// Edge of the square panel, scene units.
@@ -93,7 +94,12 @@ fn worst(job: &Job, picture: Picture, height: f64) -> f64 {
 #[test]
 fn an_image_lights_the_floor_as_its_integral_says() {
     for (name, picture) in PICTURES {
-        for (cuts, kind) in [(1, IntersectorKind::Embree), (7, IntersectorKind::Oracle)] {
+        for (cuts, kind) in [
+            (1, IntersectorKind::Embree),
+            (7, IntersectorKind::Oracle),
+            // More faces than lights.
+            (60, IntersectorKind::Embree),
+        ] {
             let mut worsts = Vec::new();
             for height in [0.3, 0.6, 1.2, 2.4] {
                 let world = lit_floor(picture, height, cuts);
@@ -122,7 +128,7 @@ fn a_convex_body_does_not_light_itself() {
     };
     let bodies = [
         ("cube", common::cube(DVec3::ZERO, 0.5, 0)),
-        ("flat ball", common::uv_sphere(20, 10)),
+        ("flat ball", common::uv_sphere(400, 200)),
         ("coarse ball", smooth(8)),
         ("ball", smooth(30)),
     ];
@@ -211,8 +217,9 @@ fn emission_and_reflection_add_up() {
 #[test]
 fn gloss_sees_an_emitting_image_once() {
     for roughness in [0.15, 0.4, 0.8] {
-        for picture in [PICTURES[0].1, PICTURES[1].1] {
-            let mut world = lit_floor(picture, 0.8, 2);
+        // Of 60 cuts there are more faces than lights.
+        for (picture, cuts) in [(PICTURES[0].1, 2), (PICTURES[1].1, 2), (PICTURES[1].1, 60)] {
+            let mut world = lit_floor(picture, 0.8, cuts);
             world.materials[0] =
                 Material { roughness, ..Material::mirror("floor", Rgb::splat(0.9)) };
             let of = |lit: bool, seed: u64, samples: u32| {
@@ -233,7 +240,9 @@ fn gloss_sees_an_emitting_image_once() {
                 (m, spread.sqrt())
             };
             let ((a, sa), (b, sb)) = (means(true), means(false));
-            println!("roughness {roughness}: {a:.5} ± {sa:.5}, by its own rays {b:.5} ± {sb:.5}");
+            println!(
+                "roughness {roughness}, {cuts} cuts: {a:.5} ± {sa:.5}, by its own rays {b:.5} ± {sb:.5}"
+            );
             assert!((a - b).abs() < 4.0 * sa.hypot(sb) + 0.005 * b, "{a} {b}");
         }
     }
@@ -252,22 +261,86 @@ fn the_same_bytes_for_any_threads() {
     assert!(film_on(&job, 1) == film_on(&job, 3));
 }
 
-/// Faces that are nearly black by an image are no lights, and of too many faces the brightest are.
+/// Faces that are nearly black by an image are no lights, and of too many faces some send the light of all.
 #[test]
-fn dim_faces_light_nothing_and_what_is_lost_is_said() {
-    let count = |world: World| {
-        let scene = world.into_scene(true).unwrap();
-        (scene.lights.len(), scene.unlit)
+fn dim_faces_light_nothing_and_groups_of_too_many_send_all_light() {
+    // Number of lights, and what they send: area times radiance.
+    let sent = |world: World| {
+        let lights = world.into_scene(true).unwrap().lights;
+        let sent = lights.iter().map(|light| match light {
+            Light::Face(light) => light.part.area() * f64::from(light.part.radiance.x),
+            other => panic!("{other:?}"),
+        });
+        (lights.len(), sent.sum::<f64>())
     };
     // The spot covers a few faces of 30 x 30 squares.
-    let (lights, unlit) = count(lit_floor(PICTURES[3].1, 1.0, 30));
-    println!("a spot on 1800 faces: {lights} lights, {unlit:?}");
-    assert!((20..1700).contains(&lights) && unlit.is_empty());
-    let (lights, unlit) = count(lit_floor(PICTURES[2].1, 1.0, 60));
-    println!("a ramp on 7200 faces: {lights} lights, {unlit:?}");
-    assert!(lights == 4096 && (0.1..0.45).contains(&unlit[0].share), "{unlit:?}");
-    let (lights, unlit) = count(lit_floor(|_, _| 1.0, 1.0, 80));
-    assert!(lights == 0 && unlit[0].share == 1.0, "{lights} {unlit:?}");
+    let (lights, _) = sent(lit_floor(PICTURES[3].1, 1.0, 30));
+    assert!((20..1700).contains(&lights), "{lights}");
+    for (name, picture) in [PICTURES[2], ("white", |_, _| 1.0)] {
+        let (_, whole) = sent(lit_floor(picture, 1.0, 1));
+        let (lights, of_groups) = sent(lit_floor(picture, 1.0, 80));
+        println!("{name} of 12800 faces: {lights} lights send {of_groups:.4}, all {whole:.4}");
+        assert!((2000..=4096).contains(&lights) && (of_groups / whole - 1.0).abs() < 2e-3);
+    }
+}
+
+/// A panel with holes lights the floor as one whose image is black there.
+#[test]
+fn cut_outs_that_emit_light_as_black_texels_do() {
+    let picture: Picture = |x, y| if x < 0.5 && y > 0.25 { 3.0 } else { 0.0 };
+    let black = lit_floor(picture, 0.6, 1);
+    let mut holes = lit_floor(|_, _| 3.0, 0.6, 1);
+    let at = |i: u32| (f64::from(i) + 0.5) / 64.0;
+    let is_there = |i: u32| picture(at(i % 64), 1.0 - at(i / 64)) > 0.0;
+    let texels = (0..4096).map(|i| if is_there(i) { 255 } else { 0 }).collect();
+    holes.masks.push(AlphaMask { name: "holes".into(), width: 64, height: 64, texels });
+    let map = TextureMap { wrap: [Wrap::Clamp; 2], ..TextureMap::of(0) };
+    for with_image in [true, false] {
+        let mut holes = holes.clone();
+        let panel = &mut holes.materials[1];
+        panel.alpha = Some(map);
+        if !with_image {
+            (panel.emission, panel.emission_map) = (panel.emission * 3.0, None);
+        }
+        let mut job = job(holes, pose((3.0, 1.0, 0.0), (1.2, 0.0, 0.0)), 24, 18);
+        (job.settings.shadow_samples, job.settings.all_lights) = (4, true);
+        let of_holes = worst(&job, picture, 0.6);
+        job.world = black.clone();
+        let of_black = worst(&job, picture, 0.6);
+        println!("worst error by holes {of_holes:.4}, by black texels {of_black:.4}");
+        assert!(of_holes < 0.02 && of_black < 0.02);
+    }
+}
+
+/// A ball of many faces lights the floor as the exact sphere does.
+#[test]
+fn a_fine_mesh_lights_as_the_sphere_that_it_stands_for() {
+    let lit = |mesh: Option<WorldMesh>| {
+        let mut world = common::plate(Material::diffuse("floor", Rgb::splat(0.5)), 4.0);
+        let mut glow = Material::black("glow");
+        glow.emission = Rgb::splat(5.0);
+        let material = world.add_material(glow);
+        let centre = DVec3::new(0.0, 0.9, 0.0);
+        match mesh {
+            Some(mut mesh) => {
+                mesh.positions.iter_mut().for_each(|p| *p = *p * 0.5 + centre);
+                world.meshes.push(WorldMesh { material, ..mesh });
+            }
+            None => world.lights.push(Light::Sphere(SphereLight {
+                centre,
+                radius: 0.5,
+                radiance: Rgb::splat(5.0),
+            })),
+        }
+        let mut job = job(world, pose((3.0, 1.5, 0.0), (1.4, 0.0, 0.0)), 32, 24);
+        (job.settings.shadow_samples, job.settings.spp, job.settings.all_lights) = (16, 4, true);
+        render(&job).0
+    };
+    let (exact, fine) = (lit(None), lit(Some(common::uv_sphere(160, 80))));
+    let off = |(a, b): (&Rgb, &Rgb)| f64::from((a.x / b.x - 1.0).abs());
+    let worst = fine.rgb.iter().zip(&exact.rgb).map(off).fold(0.0, f64::max);
+    println!("25,280 faces: means {:.5} and {:.5}, worst {worst:.4}", mean(&fine), mean(&exact));
+    assert!((mean(&fine) / mean(&exact) - 1.0).abs() < 3e-3 && worst < 0.02);
 }
 
 /// Rays see the image's lower left corner, and the floor is lit by that.

@@ -7,7 +7,7 @@ use crate::error::{Diagnostic, Error, Result};
 use crate::import::{self, Loaded};
 use crate::output::FramePattern;
 use crate::scene::limits::MAX_EDGE;
-use crate::scene::{Aovs, Collapsed, MOST_FACE_LIGHTS, Policy, Scene, Settings, Unlit};
+use crate::scene::{Aovs, Collapsed, Policy, Scene, Settings};
 use crate::shade::SampleSpread;
 use std::path::{Path, PathBuf};
 
@@ -44,8 +44,7 @@ fn refuse_folder(path: &Path) -> Result<()> {
     Err(Error::input(path, format!("is a folder, not a scene file\n  help: {help}")))
 }
 
-/// Warnings about meshes of the scene at `file`: those that lost triangles to rounding, bodies of glass that are open, and those
-/// whose light lights nothing.
+/// Warnings about meshes of the scene at `file`: those that lost triangles to rounding, and bodies of glass that are open.
 pub fn mesh_warnings(scene: &Scene, file: &Path) -> Vec<Diagnostic> {
     let warning = |c: &Collapsed| {
         let Collapsed { mesh, lost, of } = c;
@@ -56,24 +55,8 @@ pub fn mesh_warnings(scene: &Scene, file: &Path) -> Vec<Diagnostic> {
         Diagnostic::new(file, message)
             .help("leave out what is far away from them, or render them apart")
     };
-    let unlit = |u: &Unlit| {
-        let Unlit { mesh, share } = u;
-        let message = match share {
-            1.0 => format!("`{mesh}` emits: it is seen, but casts no light"),
-            _ => format!(
-                "`{mesh}` emits: all of it is seen, but {:.0} % of its light lights nothing",
-                100.0 * share
-            ),
-        };
-        let help = format!(
-            "the {MOST_FACE_LIGHTS} brightest faces of a mesh light the scene, where these send half of its light: make what \
-             emits of fewer faces, or of several meshes"
-        );
-        Diagnostic::new(file, message).help(help)
-    };
     let collapsed = scene.collapsed.iter().map(warning);
-    let others = collapsed.chain(scene.unlit.iter().map(unlit));
-    others.chain(open_glass(&scene.open_glass, file)).collect()
+    collapsed.chain(open_glass(&scene.open_glass, file)).collect()
 }
 
 /// The warning about bodies of glass that are open, which have these `names`; `None` without any.

@@ -1,8 +1,8 @@
 //! Lights in place of surfaces that emit and do nothing else.
 //!
 //! An analytic sphere becomes a sphere light; the faces of a mesh become quad lights, at most [`MAX_LIGHTS`]. [`World::into_scene`]
-//! gives lights their surface, so the sphere or mesh itself leaves the world. A mesh that reflects too, or emits by an image,
-//! stays, and the scene makes lights of its faces. A surface with cut-outs casts no light, since lights have no holes.
+//! gives lights their surface, so the sphere or mesh itself leaves the world. A mesh that reflects too, emits by an image,
+//! or has cut-outs stays, and the scene makes lights of its faces. A sphere by an image or with cut-outs casts no light.
 
 use super::lamps::cover;
 use crate::scene::{Light, Material, QuadLight, SphereLight, World};
@@ -12,7 +12,7 @@ use crate::scene::{Light, Material, QuadLight, SphereLight, World};
 pub(super) enum Note {
     /// The sphere of this name is visible but lights nothing, since it emits by an image.
     CastsNoLight(String),
-    /// The surface of this name is visible but lights nothing, since it has cut-outs.
+    /// The sphere of this name is visible but lights nothing, since it has cut-outs.
     HasHoles(String),
     /// The sphere of this name became a light, which reflects nothing.
     ReflectsNothing(String),
@@ -28,7 +28,9 @@ impl Note {
                 )
             }
             Self::HasHoles(name) => {
-                format!("`{name}` emits and has cut-outs: it is seen, but casts no light")
+                format!(
+                    "`{name}` is a sphere that emits and has cut-outs: it is seen, but casts no light"
+                )
             }
             Self::ReflectsNothing(name) => {
                 format!("`{name}` became a light: its reflectance is ignored")
@@ -39,8 +41,7 @@ impl Note {
     /// The help line of the warning.
     pub fn help(&self) -> String {
         match self {
-            Self::CastsNoLight(_) => "take a mesh, as `uv_sphere`".into(),
-            Self::HasHoles(_) => "a light has no holes: take `alpha` from its material".into(),
+            Self::CastsNoLight(_) | Self::HasHoles(_) => "take a mesh, as `uv_sphere`".into(),
             Self::ReflectsNothing(_) => "give it a material with `emission` alone".into(),
         }
     }
@@ -61,11 +62,7 @@ pub(super) fn adopt(world: &mut World, first_mesh: usize, first_sphere: usize) -
                 };
                 world.lights.extend(quads.into_iter().map(light));
             }
-            None => {
-                let has_holes = material.emits() && material.alpha.is_some();
-                notes.extend(has_holes.then(|| Note::HasHoles(mesh.name.clone())));
-                world.meshes.push(mesh);
-            }
+            None => world.meshes.push(mesh),
         }
     }
     for sphere in world.spheres.split_off(first_sphere) {
@@ -174,12 +171,11 @@ mod tests {
     }
 
     #[test]
-    fn what_has_cut_outs_glows_and_is_no_light() {
+    fn a_sphere_with_cut_outs_glows_and_is_no_light() {
         let mut world = world(lamp(vec![[0, 1, 2], [0, 2, 3]], 0.0));
         world.materials[0].alpha = Some(crate::scene::TextureMap::of(0));
         world.spheres.push(WorldSphere::new("ball", DVec3::X, 0.5, 0));
-        let holes = |name: &str| Note::HasHoles(name.into());
-        assert_eq!(adopt(&mut world, 0, 0), [holes("lamp"), holes("ball")]);
+        assert_eq!(adopt(&mut world, 0, 0), [Note::HasHoles("ball".into())]);
         assert_eq!((world.spheres.len(), world.lights.len(), world.meshes.len()), (1, 0, 1));
     }
 }

@@ -35,8 +35,8 @@ struct Image {
     state: State,
     /// Whether it looks like a normal map; `None` of a mask, of data and of what is not to be had.
     looks_like_normals: Option<bool>,
-    /// Whether colours above 1 were cut.
-    is_cut: bool,
+    /// What a warning says of numbers that were cut.
+    cut: Option<&'static str>,
 }
 
 /// Where an image is.
@@ -118,16 +118,15 @@ impl Images {
 
     /// Why the image may be meant for another use, if it may.
     pub fn doubt(&mut self, path: &Path, what: ImageUse) -> Option<&'static str> {
-        let is_cut = self.image(path, what)?.is_cut;
-        match (what, self.looks_like_normals(path, what)?) {
-            (ImageUse::Colour, false) if is_cut => Some(texture::CUT_COLOURS),
+        let Image { cut, looks_like_normals, .. } = *self.image(path, what)?;
+        match (what, looks_like_normals.unwrap_or(false)) {
             (ImageUse::Normals, false) => Some(
                 "this does not look like a normal map: few of its texels are unit vectors in tangent space",
             ),
             (ImageUse::Colour, true) => {
                 Some("this looks like a normal map, and is shown as a colour")
             }
-            _ => None,
+            _ => cut,
         }
     }
 }
@@ -157,35 +156,35 @@ fn decode((path, uses): (PathBuf, BTreeSet<ImageUse>)) -> Vec<((PathBuf, ImageUs
         Err(error) => Err(error.clone()),
     };
     let of = |what| {
-        let (state, is_cut) = match image(what) {
-            Ok((texels, is_cut)) => (State::Decoded(texels), is_cut),
-            Err(error) => (State::Refused(error), false),
+        let (state, cut) = match image(what) {
+            Ok((texels, cut)) => (State::Decoded(texels), cut),
+            Err(error) => (State::Refused(error), None),
         };
         let looks_like_normals = match (what, &state) {
-            (ImageUse::Colour | ImageUse::Normals, State::Decoded(Texels::Texture(texture))) => {
+            (ImageUse::Colour, State::Decoded(Texels::Texture(texture))) => {
                 Some(texture.looks_like_normals())
+            }
+            (ImageUse::Normals, State::Decoded(Texels::Texture(texture))) => {
+                Some(texture.may_be_normals())
             }
             _ => None,
         };
-        ((path.clone(), what), Image { state, looks_like_normals, is_cut })
+        ((path.clone(), what), Image { state, looks_like_normals, cut })
     };
     uses.into_par_iter().map(of).collect()
 }
 
 impl ImageUse {
-    /// What the world holds of `image` in this use, and whether colours above 1 were cut.
-    fn texels(self, path: &Path, image: &DynamicImage) -> Result<(Texels, bool)> {
-        let texture = match self {
-            Self::Colour => {
-                let (texture, is_cut) = texture::reflectances(path, image)?;
-                return Ok((Texels::Texture(texture), is_cut));
-            }
-            Self::Mask => return Ok((Texels::Mask(alpha::mask_of(path, image)?), false)),
+    /// What the world holds of `image` in this use, and what a warning says of numbers that were cut.
+    fn texels(self, path: &Path, image: &DynamicImage) -> Result<(Texels, Option<&'static str>)> {
+        let (texture, cut) = match self {
+            Self::Colour => texture::reflectances(path, image)?,
             Self::Light => texture::colours(path, image)?,
-            Self::Data(channel) => texture::data(path, image, channel)?,
-            Self::Normals => texture::normals(path, image)?,
+            Self::Data(channel) => (texture::data(path, image, channel)?, None),
+            Self::Normals => (texture::normals(path, image)?, None),
+            Self::Mask => return Ok((Texels::Mask(alpha::mask_of(path, image)?), None)),
         };
-        Ok((Texels::Texture(texture), false))
+        Ok((Texels::Texture(texture), cut))
     }
 }
 

@@ -8,14 +8,17 @@ mod grey_exr;
 use crate::error::{Diagnostic, Error, Result};
 use crate::math::{Rgb, srgb_decode};
 use crate::scene::Texture;
-use crate::stats::Fault;
 use image::{DynamicImage, ImageFormat, ImageReader, Limits};
 use std::borrow::Cow;
 use std::io::Cursor;
 use std::path::Path;
 
-/// The largest image that is decoded, bytes of its own pixel format.
-pub const MAX_IMAGE_BYTES: u64 = 256 << 20;
+/// Most pixels of an image: 16384 x 16384, up to 4 GB as floats.
+pub const MAX_IMAGE_PIXELS: u64 = 1 << 28;
+/// Most pixels of an image whose file need not be as large as such images are.
+const FEW_PIXELS: u64 = 1 << 24;
+/// Pixels that a byte of a larger image's file stands for at most. Compression by deflate or runs reaches some hundreds.
+const PIXELS_A_BYTE: u64 = 4096;
 /// Its longest edge, pixels.
 const MAX_IMAGE_EDGE: u32 = 1 << 16;
 
@@ -34,33 +37,46 @@ pub(super) enum ImageChannel {
 
 /// Reads an image: bmp, exr, hdr, jpeg, png, pnm, or tga. The content decides, but for tga, which the name tells.
 ///
-/// Errors: `Error::Io`; `Error::Input` for what is no such image or larger than
-/// [`MAX_IMAGE_BYTES`], before memory is asked for.
+/// Errors: `Error::Io`; `Error::Input` for what is no such image or has more than [`MAX_IMAGE_PIXELS`], before memory is
+/// asked for.
 pub fn load_texture(path: &Path) -> Result<Texture> {
-    colours(path, &decode(path)?)
+    Ok(colours(path, &decode(path)?)?.0)
 }
 
 /// What a warning says of colours that [`reflectances`] cuts.
 pub(super) const CUT_COLOURS: &str =
     "colours above 1 are cut to 1: no surface reflects more light than it receives";
 
-/// The colours of a decoded image, in codes of 8 bits if it has no more.
+/// What a warning says of negative numbers, which programs and lossy compression make beside steep edges.
+const CUT_NEGATIVES: &str = "numbers below 0 are cut to 0: no light is negative";
+
+/// The colours of a decoded image, in codes of 8 bits if it has no more, and what a warning says of those that were cut.
 ///
-/// Errors: a pixel that is no light.
-pub(super) fn colours(path: &Path, image: &DynamicImage) -> Result<Texture> {
-    Ok(colours_up_to(path, image, f32::INFINITY)?.0)
+/// Errors: a pixel that is not finite.
+pub(super) fn colours(
+    path: &Path,
+    image: &DynamicImage,
+) -> Result<(Texture, Option<&'static str>)> {
+    colours_up_to(path, image, f32::INFINITY)
 }
 
-/// [`colours`] of which none is above 1, as no surface reflects more than it receives, and whether any was.
-pub(super) fn reflectances(path: &Path, image: &DynamicImage) -> Result<(Texture, bool)> {
+/// [`colours`] of which none is above 1, as no surface reflects more than it receives.
+pub(super) fn reflectances(
+    path: &Path,
+    image: &DynamicImage,
+) -> Result<(Texture, Option<&'static str>)> {
     colours_up_to(path, image, 1.0)
 }
 
-/// The colours of a decoded image, cut at `most`, and whether any was above.
-fn colours_up_to(path: &Path, image: &DynamicImage, most: f32) -> Result<(Texture, bool)> {
+/// The colours of a decoded image, cut at 0 and `most`.
+fn colours_up_to(
+    path: &Path,
+    image: &DynamicImage,
+    most: f32,
+) -> Result<(Texture, Option<&'static str>)> {
     let (name, size) = (path.display().to_string(), [image.width(), image.height()]);
     if let Some(codes) = image.as_flat_samples_u8() {
-        return Ok((Texture::from_srgb(name, size, rgb(codes.samples, image).collect()), false));
+        return Ok((Texture::from_srgb(name, size, rgb(codes.samples, image).collect()), None));
     }
     let texels: Vec<Rgb> = match image.as_flat_samples_u16() {
         Some(codes) => {
@@ -71,12 +87,18 @@ fn colours_up_to(path: &Path, image: &DynamicImage, most: f32) -> Result<(Textur
         }
         None => floats(image).into_iter().map(Rgb::from_array).collect(),
     };
-    if !texels.iter().all(|c| Fault::of(c.to_array()).is_none()) {
+    if !texels.iter().all(|c| c.is_finite()) {
         return Err(bad_pixel(path));
     }
-    let is_cut = texels.iter().any(|c| c.max_element() > most);
-    let texels = texels.into_iter().map(|c| c.min(Rgb::splat(most))).collect();
-    Ok((Texture::from_linear(name, size, texels), is_cut))
+    let is_bright = texels.iter().any(|c| c.max_element() > most);
+    let is_negative = texels.iter().any(|c| c.min_element() < 0.0);
+    let cut = match (is_bright, is_negative) {
+        (true, _) => Some(CUT_COLOURS),
+        (false, true) => Some(CUT_NEGATIVES),
+        (false, false) => None,
+    };
+    let texels = texels.into_iter().map(|c| c.clamp(Rgb::ZERO, Rgb::splat(most))).collect();
+    Ok((Texture::from_linear(name, size, texels), cut))
 }
 
 /// The normals of a decoded image: red, green and blue as they stand.
@@ -121,9 +143,9 @@ pub(super) fn data(path: &Path, image: &DynamicImage, channel: ImageChannel) -> 
     Ok(Texture::from_data16(name, size, texels.ok_or_else(|| bad_pixel(path))?))
 }
 
-/// The error of an image with a value that is no amount of light.
+/// The error of an image with a value that is no number.
 pub(super) fn bad_pixel(path: &Path) -> Error {
-    Error::input(path, "a pixel of the image is negative or not a finite number")
+    Error::input(path, "a pixel of the image is not a finite number")
 }
 
 /// The image of a file, with at least one pixel.
@@ -136,7 +158,7 @@ pub(super) fn decode(path: &Path) -> Result<DynamicImage> {
 /// The image whose file holds `bytes`, as [`decode`]; `path` names it.
 pub(super) fn decode_bytes(path: &Path, bytes: &[u8]) -> Result<DynamicImage> {
     let mut limits = Limits::default();
-    limits.max_alloc = Some(MAX_IMAGE_BYTES);
+    limits.max_alloc = Some(16 * MAX_IMAGE_PIXELS);
     limits.max_image_width = Some(MAX_IMAGE_EDGE);
     limits.max_image_height = Some(MAX_IMAGE_EDGE);
     // Some decoders ask for memory before they look at the limits: the size comes first.
@@ -173,24 +195,28 @@ fn is_whole_jpeg(bytes: &[u8]) -> bool {
 
 /// How many pixels the image has whose file holds `bytes`, by its header.
 ///
-/// Errors: what is no image, no pixels, or more than [`MAX_IMAGE_BYTES`].
+/// Errors: what is no image, no pixels, more than [`MAX_IMAGE_PIXELS`], or far more than the file can hold.
 pub(super) fn pixels(path: &Path, bytes: &[u8]) -> Result<u64> {
     let (width, height) = match grey_exr::size(bytes) {
         Some(size) => size,
         None => reader(path, bytes)?.into_dimensions().map_err(|error| unreadable(path, &error))?,
     };
     let pixels = u64::from(width) * u64::from(height);
-    if pixels == 0 || pixels * 3 > MAX_IMAGE_BYTES {
-        return Err(too_large(path, (width, height)));
+    let fault = Diagnostic::new(path, format!("an image of {width} x {height} pixels"));
+    if pixels == 0 {
+        return Err(fault.into());
+    }
+    if pixels > MAX_IMAGE_PIXELS || width.max(height) > MAX_IMAGE_EDGE {
+        let help = format!(
+            "an image has at most {MAX_IMAGE_PIXELS} pixels, and {MAX_IMAGE_EDGE} along an edge: make it smaller"
+        );
+        return Err(fault.help(help).into());
+    }
+    let length = bytes.len() as u64;
+    if pixels > FEW_PIXELS && pixels > PIXELS_A_BYTE * length {
+        return Err(fault.help(format!("its file has only {length} bytes: it is damaged")).into());
     }
     Ok(pixels)
-}
-
-/// The error of an image of no pixels or too many.
-fn too_large(path: &Path, (width, height): (u32, u32)) -> Error {
-    Diagnostic::new(path, format!("an image of {width} x {height} pixels"))
-        .help(format!("at most {MAX_IMAGE_BYTES} bytes can be decoded"))
-        .into()
 }
 
 fn reader<'a>(path: &Path, bytes: &'a [u8]) -> Result<ImageReader<Cursor<Cow<'a, [u8]>>>> {
@@ -243,10 +269,9 @@ fn numbers<T: Copy>(
     samples.chunks_exact(channels).map(move |pixel| pixel[at])
 }
 
-/// A share as one of 65535, cut at 1; `None` of what is negative or not finite.
+/// A share as one of 65535, cut at 0 and 1; `None` of what is not finite.
 fn share16(value: f32) -> Option<u16> {
-    let is_share = (0.0..=f32::MAX).contains(&value);
-    is_share.then(|| (value.min(1.0) * 65_535.0).round() as u16)
+    value.is_finite().then(|| (value.clamp(0.0, 1.0) * 65_535.0).round() as u16)
 }
 
 #[cfg(test)]
@@ -278,7 +303,7 @@ mod tests {
             // Codes of 8 bits, or floats rounded to 16.
             let is_near = |a: f32, b: f32| (a - b).abs() < 1e-5;
             let vectors = normals(path, image).expect("normals");
-            let shown = colours(path, image).expect("colours");
+            let (shown, _) = colours(path, image).expect("colours");
             for (x, y, pixel) in expected.enumerate_pixels() {
                 let at = |texture: &Texture| {
                     texture.levels()[0].texel(x as usize, y as usize).to_array()
@@ -310,16 +335,43 @@ mod tests {
         let image: DynamicImage =
             image::Rgb32FImage::from_pixel(1, 1, image::Rgb([0.5, 1.0, 3.0])).into();
         let texel = |texture: Texture| texture.levels()[0].texel(0, 0);
-        assert_eq!(texel(colours(path, &image).expect("light")), Rgb::new(0.5, 1.0, 3.0));
-        let (cut, is_cut) = reflectances(path, &image).expect("colours");
-        assert_eq!((texel(cut), is_cut), (Rgb::new(0.5, 1.0, 1.0), true));
+        assert_eq!(texel(colours(path, &image).expect("light").0), Rgb::new(0.5, 1.0, 3.0));
+        let (texture, cut) = reflectances(path, &image).expect("colours");
+        assert_eq!((texel(texture), cut), (Rgb::new(0.5, 1.0, 1.0), Some(CUT_COLOURS)));
+        // As lossy compression leaves it beside a steep edge.
+        let ringing = image::Rgb32FImage::from_pixel(1, 1, image::Rgb([-1e-5, 1.0, 0.0])).into();
+        let (texture, cut) = colours(path, &ringing).expect("light");
+        assert_eq!((texel(texture), cut), (Rgb::new(0.0, 1.0, 0.0), Some(CUT_NEGATIVES)));
         let white: DynamicImage = image::Rgb32FImage::from_pixel(1, 1, image::Rgb([1.0; 3])).into();
         for white in [white.to_rgb8().into(), white.to_rgb16().into(), white] {
-            assert!(!reflectances(path, &white).expect("colours").1);
+            assert_eq!(reflectances(path, &white).expect("colours").1, None);
         }
-        for bad in [f32::NAN, f32::INFINITY, -0.5] {
+        for bad in [f32::NAN, f32::INFINITY] {
             let bad = image::Rgb32FImage::from_pixel(1, 1, image::Rgb([0.5, bad, 0.5])).into();
             assert!(reflectances(path, &bad).is_err() && colours(path, &bad).is_err());
+        }
+    }
+
+    #[test]
+    fn large_images_are_read_and_what_a_file_cannot_hold_is_not() {
+        let path = Path::new("t.hdr");
+        let file = |width: u32, height: u32, length: usize| {
+            let head = format!("#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y {height} +X {width}\n");
+            [head.as_bytes(), &vec![0; length]].concat()
+        };
+        let found = |width, height, length| {
+            pixels(path, &file(width, height, length)).map_err(|error| error.to_string())
+        };
+        assert_eq!(found(8192, 4096, 2 << 20), Ok(1 << 25));
+        assert_eq!(found(16_384, 16_384, 2 << 20), Ok(1 << 28));
+        for (width, height, length, help) in [
+            (16_384, 16_385, 2 << 20, "at most 268435456 pixels"),
+            (65_537, 1, 2 << 20, "65536 along an edge"),
+            (8192, 4096, 200, "it is damaged"),
+            (100_000, 100_000, 200, "at most"),
+        ] {
+            let refused = found(width, height, length).expect_err("refused");
+            assert!(refused.contains(help), "{refused}");
         }
     }
 
@@ -352,7 +404,7 @@ mod tests {
     }
 
     #[test]
-    fn data_and_normals_of_floats_are_cut_at_one_and_refused_below_zero() {
+    fn data_and_normals_of_floats_are_cut_at_zero_and_one() {
         let path = Path::new("t");
         let of = |value: f32| {
             let image = image::Rgb32FImage::from_pixel(1, 1, image::Rgb([value; 3])).into();
@@ -361,7 +413,7 @@ mod tests {
             assert_eq!(normals(path, &image).map(texel).ok(), data);
             data
         };
-        assert_eq!([of(0.0), of(1.0), of(7.0)], [Some(0.0), Some(1.0), Some(1.0)]);
-        assert_eq!([of(-0.1), of(f32::NAN), of(f32::INFINITY)], [None; 3]);
+        assert_eq!([of(-0.1), of(0.0), of(1.0), of(7.0)], [0.0, 0.0, 1.0, 1.0].map(Some));
+        assert_eq!([of(f32::NAN), of(f32::INFINITY)], [None; 2]);
     }
 }

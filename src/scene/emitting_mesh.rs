@@ -1,13 +1,16 @@
-//! Makes lights of the faces of meshes that emit and are seen as they are: what reflects light too, or emits by an image.
+//! Makes lights of the faces of meshes that emit and are seen as they are: what reflects light too, emits by an image, or has
+//! cut-outs.
 //!
-//! A face is one light, of the mean of what it emits. Where an image makes that differ within a face, the face is cut into rows
+//! A face is one light, of the mean of what it emits, holes included. Where an image or holes make that differ within a face, the face is cut into rows
 //! of smaller triangles, those first whose parts differ most. So light is right from far away, and near by up to what differs
 //! within one part.
+//!
+//! Of more faces than a mesh may have lights, neighbours that face alike are a group, and one of them sends the light of all.
 
-use super::face_lights::{FaceLights, MOST_FACE_LIGHTS, Unlit};
+use super::face_lights::{FaceLights, MOST_FACE_LIGHTS};
 use super::light::{FaceLight, Light, QuadLight};
-use super::{Material, Mesh, Texture, TextureMap};
-use crate::math::{DVec2, DVec3, Rgb, Vec2};
+use super::{AlphaMask, Corners, LaidMask, Material, Mesh, Texture, TextureMap};
+use crate::math::{Bounds3, DVec2, DVec3, Rgb, Vec2};
 use rayon::prelude::*;
 use std::collections::BinaryHeap;
 
@@ -17,28 +20,33 @@ const MOST_PARTS: usize = 512;
 const SMALL: f64 = 0.01;
 /// Faces that together send this share of a mesh's light cast none: black that is nearly so would be thousands of lights.
 const LEAST: f64 = 1e-3;
-/// A mesh whose lights would send a smaller share of its light than this casts none.
-const ENOUGH: f64 = 0.5;
+/// Rows of points by which a face with holes is averaged.
+const HOLE_ROWS: u32 = 32;
+/// The golden ratio, whose multiples have fractions that lie evenly.
+const GOLDEN: f64 = 0.618_033_988_749_894_9;
+/// Bits of the places along each axis that groups of faces are told apart by.
+const PLACE_BITS: u32 = 10;
 
 /// Lights of `mesh`, scene space, of `material`, the first of which will be number `first` of the scene's. `None` where it
-/// has none, and what of its light it then does not send.
+/// has none.
 pub(super) fn face_lights(
     mesh: &Mesh,
     material: &Material,
-    textures: &[Texture],
+    (textures, masks): (&[Texture], &[AlphaMask]),
     first: u32,
-) -> (Option<(FaceLights, Vec<Light>)>, Option<Unlit>) {
-    if !material.emits() || material.alpha.is_some() {
-        return (None, None);
+) -> Option<(FaceLights, Vec<Light>)> {
+    if !material.emits() {
+        return None;
     }
-    let emission = Emission::of(mesh, material, textures);
+    let emission = Emission::of(mesh, material, (textures, masks));
     let means = emission.of_faces();
     let powers: Vec<f64> = (0..means.len()).map(|at| emission.power(at, means[at])).collect();
-    let (chosen, share) = brightest(&powers, emission.image.is_some());
-    let lost = (share < 1.0 - 10.0 * LEAST).then_some(1.0 - share);
-    let unlit = |share| Unlit { mesh: mesh.name.clone(), share };
-    if chosen.is_empty() || share < ENOUGH {
-        return (None, (!chosen.is_empty()).then(|| unlit(1.0)));
+    let chosen = brightest(&powers, !emission.is_even());
+    if chosen.is_empty() {
+        return None;
+    }
+    if chosen.len() > MOST_FACE_LIGHTS {
+        return Some(emission.of_groups(&chosen, (&means, &powers), first));
     }
     let rows = emission.rows(&chosen, powers.iter().sum());
     let mut all = FaceLights::none(means.len());
@@ -49,10 +57,10 @@ pub(super) fn face_lights(
         let triangle = mesh.corners(at);
         let light = |corners, radiance| {
             let part = QuadLight { corners, radiance, two_sided: material.emits_back };
-            Light::Face(FaceLight { part, triangle })
+            Light::Face(FaceLight { part, triangle, stands_for: 1.0 })
         };
         // Two triangles of one radiance are one quad where they can be.
-        let quad = chosen.peek().filter(|_| emission.image.is_none());
+        let quad = chosen.peek().filter(|_| emission.is_even());
         let quad = quad.and_then(|(next, _)| {
             Some((**next, QuadLight::joined(triangle, mesh.corners(**next))?))
         });
@@ -76,32 +84,38 @@ pub(super) fn face_lights(
             }
         }
     }
-    (Some((all, lights)), lost.map(unlit))
+    Some((all, lights))
 }
 
-/// The faces that are lights, in their order, and the share of all power that they have; `by_image` differs what they emit.
-fn brightest(powers: &[f64], by_image: bool) -> (Vec<usize>, f64) {
+/// The faces that cast light, in their order; `may_differ` says whether they emit differently.
+fn brightest(powers: &[f64], may_differ: bool) -> Vec<usize> {
     let total: f64 = powers.iter().sum();
     let mut order: Vec<usize> = (0..powers.len()).filter(|at| powers[*at] > 0.0).collect();
-    order.sort_by(|a, b| powers[*b].total_cmp(&powers[*a]).then(a.cmp(b)));
-    let enough = if by_image { (1.0 - LEAST) * total } else { f64::INFINITY };
-    let mut sum = 0.0;
-    let mut count = 0;
-    while count < order.len().min(MOST_FACE_LIGHTS) && sum < enough {
-        sum += powers[order[count]];
-        count += 1;
+    if !may_differ {
+        return order;
     }
+    order.sort_by(|a, b| powers[*b].total_cmp(&powers[*a]).then(a.cmp(b)));
+    let mut sum = 0.0;
+    let is_enough = |at: &usize| {
+        sum += powers[*at];
+        sum >= (1.0 - LEAST) * total
+    };
+    let count = order.iter().position(is_enough).map_or(order.len(), |last| last + 1);
     order.truncate(count);
     order.sort_unstable();
-    (order, if total > 0.0 { sum / total } else { 0.0 })
+    order
 }
 
 /// What the faces of a mesh emit.
 struct Emission<'m> {
     mesh: &'m Mesh,
     colour: Rgb,
+    /// Whether backs emit too.
+    two_sided: bool,
     /// The image that multiplies it, and the coordinates of that.
     image: Option<(&'m Texture, &'m TextureMap)>,
+    /// Where there is a surface at all.
+    mask: Option<LaidMask<'m>>,
 }
 
 /// Weights of the second and third corner of a triangle, at the corners of a part of it.
@@ -110,17 +124,29 @@ type Part = [(f64, f64); 3];
 const WHOLE: Part = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)];
 
 impl<'m> Emission<'m> {
-    fn of(mesh: &'m Mesh, material: &'m Material, textures: &'m [Texture]) -> Self {
+    fn of(
+        mesh: &'m Mesh,
+        material: &'m Material,
+        (textures, masks): (&'m [Texture], &'m [AlphaMask]),
+    ) -> Self {
+        let laid = |map: &'m TextureMap| LaidMask { mask: &masks[map.image as usize], map };
+        let mask = material.alpha.as_ref().map(laid);
         let image = material.emission_map.as_ref();
         let image = image.map(|map| (&textures[map.image as usize], map));
+        let two_sided = material.emits_back;
         match image {
             // Rays see the lower left corner.
             Some((image, map)) if mesh.uv_set(map.uv_set).is_none() => {
                 let seen = image.levels()[0].bilinear(map.wrap, map.place(Vec2::ZERO));
-                Self { mesh, colour: material.emission * seen, image: None }
+                Self { colour: material.emission * seen, image: None, mask, mesh, two_sided }
             }
-            _ => Self { mesh, colour: material.emission, image },
+            _ => Self { colour: material.emission, image, mask, mesh, two_sided },
         }
+    }
+
+    /// Whether every point emits the same.
+    fn is_even(&self) -> bool {
+        self.image.is_none() && self.mask.is_none()
     }
 
     /// The mean radiance of each face; 0 of those without an area.
@@ -143,6 +169,9 @@ impl<'m> Emission<'m> {
 
     /// The mean radiance of a part of face `at`: of many points in rows, looked up where texels are about as far apart.
     fn mean(&self, at: usize, part: Part) -> Rgb {
+        if let Some(mask) = &self.mask {
+            return self.mean_there(at, part, mask);
+        }
         let Some((image, map)) = self.image else { return self.colour };
         let Some(uvs) = self.mesh.uv_set(map.uv_set) else { return self.colour };
         let [a, b, c] = uvs.get(at, self.mesh.triangles[at]);
@@ -151,10 +180,109 @@ impl<'m> Emission<'m> {
         self.colour * mean_between(image, map, corners)
     }
 
+    /// Lights of groups of the `chosen` faces, of these `means` and `powers`, the first of which will be number `first` of the
+    /// scene's. Each group has about as much power as any other, and each is one light: a face of it with the light of all, taken
+    /// by power as samples would be. So the light is right from far away, and shadow rays end on the mesh.
+    fn of_groups(
+        &self,
+        chosen: &[usize],
+        (means, powers): (&[Rgb], &[f64]),
+        first: u32,
+    ) -> (FaceLights, Vec<Light>) {
+        let middle = |at: usize| self.mesh.corners(at).iter().sum::<DVec3>() / 3.0;
+        let mut bounds = Bounds3::EMPTY;
+        chosen.iter().for_each(|at| bounds.include(middle(*at)));
+        let place = |at: &usize| (self.place_of(*at, middle(*at), &bounds), *at);
+        let mut order: Vec<(u64, usize)> = chosen.par_iter().map(place).collect();
+        order.par_sort_unstable();
+        let total: f64 = chosen.iter().map(|at| powers[*at]).sum();
+        // The last group may have less.
+        let least = total / (MOST_FACE_LIGHTS - 1) as f64;
+        let (mut all, mut lights) = (FaceLights::none(means.len()), Vec::new());
+        let (mut from, mut power) = (0, 0.0);
+        for to in 1..=order.len() {
+            power += powers[order[to - 1].1];
+            if power < least && to < order.len() {
+                continue;
+            }
+            let group = || order[from..to].iter().map(|(_, at)| *at);
+            // A share of the group's power along the order; any fixed one would prefer larger faces.
+            let mut left = power * (GOLDEN * lights.len() as f64).fract();
+            let is_there = |at: &usize| {
+                left -= powers[*at];
+                left < 0.0
+            };
+            let one = group().find(is_there).unwrap_or(order[to - 1].1);
+            let sent: DVec3 = group().map(|at| means[at].as_dvec3() * self.area(at)).sum();
+            let number = Some(first + lights.len() as u32);
+            for at in group() {
+                all.cut(at, 1);
+                all.push(number);
+            }
+            let triangle = self.mesh.corners(one);
+            let [a, b, c] = triangle;
+            let radiance = (sent / self.area(one)).as_vec3();
+            let part = QuadLight { corners: [a, b, c, c], radiance, two_sided: self.two_sided };
+            let stands_for = group().map(|at| self.area(at)).sum::<f64>() / self.area(one);
+            lights.push(Light::Face(FaceLight { part, triangle, stands_for }));
+            (from, power) = (to, 0.0);
+        }
+        (all, lights)
+    }
+
+    /// Where face `at` comes in the order of groups: by the axis that its normal is nearest to and the side along that, then along
+    /// a curve through the cells of `bounds` that its `middle` lies in (Morton, 1966).
+    fn place_of(&self, at: usize, middle: DVec3, bounds: &Bounds3) -> u64 {
+        let [a, b, c] = self.mesh.corners(at);
+        let normal = (b - a).cross(c - a);
+        let axis = normal.abs().max_position();
+        let side = 2 * axis as u64 + u64::from(normal[axis] < 0.0);
+        let extent = bounds.extent().max_element().max(f64::MIN_POSITIVE);
+        let cell =
+            ((middle - bounds.min) / extent * f64::from((1u32 << PLACE_BITS) - 1)).as_u64vec3();
+        let mut place = side;
+        for bit in (0..PLACE_BITS).rev() {
+            for x in cell.to_array() {
+                place = place << 1 | (x >> bit & 1);
+            }
+        }
+        place
+    }
+
+    /// The same of what has holes.
+    fn mean_there(&self, at: usize, part: Part, mask: &LaidMask<'_>) -> Rgb {
+        let triangle = self.mesh.triangles[at];
+        // Rays see the lower left corner where there are no coordinates.
+        let corners_of = |uvs: Option<&Corners<Vec2>>| match uvs {
+            Some(uvs) => uvs.get(at, triangle).map(|uv| uv.as_dvec2()),
+            None => [DVec2::ZERO; 3],
+        };
+        let between = |[a, b, c]: [DVec2; 3], (u, v): (f64, f64)| a + (b - a) * u + (c - a) * v;
+        let of_mask = corners_of(mask.uvs(self.mesh));
+        let image = self.image.map(|(image, map)| {
+            (&image.levels()[0], map, corners_of(self.mesh.uv_set(map.uv_set)))
+        });
+        let mut sum = DVec3::ZERO;
+        for smaller in parts(HOLE_ROWS) {
+            let middle = within(part, smaller).map(DVec2::from).iter().sum::<DVec2>() / 3.0;
+            let place = middle.into();
+            if mask.is_there(between(of_mask, place).as_vec2()) {
+                sum += match &image {
+                    Some((level, map, corners)) => {
+                        let uv = between(*corners, place).as_vec2();
+                        level.bilinear(map.wrap, map.place(uv)).as_dvec3()
+                    }
+                    None => DVec3::ONE,
+                };
+            }
+        }
+        self.colour * (sum / f64::from(HOLE_ROWS * HOLE_ROWS)).as_vec3()
+    }
+
     /// Into how many rows each of the `chosen` faces is cut, of which all send `total`.
     fn rows(&self, chosen: &[usize], total: f64) -> Vec<u32> {
         let mut rows = vec![1; chosen.len()];
-        if self.image.is_none() || chosen.len() >= MOST_PARTS {
+        if self.is_even() || chosen.len() >= MOST_PARTS {
             return rows;
         }
         let differs = |k: usize, rows| Differs { by: self.differs(chosen[k], rows), at: k };

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Most lights of a mesh: each has bounds in the cells of lights. Of more faces the brightest count.
+/// Most lights of a mesh: each has bounds in the cells of lights. Of more faces one of each group sends the group's light.
 pub const MOST_FACE_LIGHTS: usize = 4096;
 
 /// Which light is where on a mesh.
@@ -12,15 +12,6 @@ pub struct FaceLights {
     faces: Vec<(u32, u32)>,
     /// Index into `Scene::lights` of each part, row by row from the first corner; [`DARK`](Self::DARK) of what is none.
     numbers: Vec<u32>,
-}
-
-/// A mesh that emits light which its lights do not.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Unlit {
-    /// Name of the mesh.
-    pub mesh: String,
-    /// The share of its light that is seen and lights nothing.
-    pub share: f64,
 }
 
 impl FaceLights {

@@ -46,7 +46,7 @@ pub use environment::{
     Daylight, Environment, EnvironmentKind, EnvironmentRadiance, IrradianceTable, RadianceTable,
     SceneEnvironment, SkyGradient, SunSky, brightness, image_place,
 };
-pub use face_lights::{FaceLights, MOST_FACE_LIGHTS, Unlit};
+pub use face_lights::{FaceLights, MOST_FACE_LIGHTS};
 pub use fog::Fog;
 pub use job::JobOptions;
 pub use lens::{Focus, Lens, LensKey, ShotLens, ThinLens, ThinLensPath};
@@ -148,8 +148,6 @@ pub struct Scene {
     pub collapsed: Vec<Collapsed>,
     /// Names of meshes that bound bodies of glass and are open. Reported, as `collapsed` is.
     pub open_glass: Vec<String>,
-    /// Meshes that emit light which lights nothing. Reported, as `collapsed` is.
-    pub unlit: Vec<Unlit>,
     /// Which lights matter where; `None` of a scene with few lights, all of which are looked at everywhere.
     pub light_cells: Option<LightCells>,
 }

@@ -80,13 +80,12 @@ impl World {
             }
             meshes.push(mesh);
         }
-        let mut unlit = Vec::new();
         for mesh in &mut meshes {
             let material = &self.materials[mesh.surface.material as usize];
             let first = lights.len() as u32;
-            let (own, rest) = face_lights(mesh, material, &self.textures, first);
-            unlit.extend(rest);
-            if let Some((own, more)) = own {
+            if let Some((own, more)) =
+                face_lights(mesh, material, (&self.textures, &self.masks), first)
+            {
                 mesh.lights = Some(own);
                 lights.extend(more);
             }
@@ -122,7 +121,6 @@ impl World {
             bounds: scene_bounds,
             collapsed,
             open_glass,
-            unlit,
             light_cells: None,
         };
         scene.light_cells = LightCells::of(&scene);

@@ -203,13 +203,22 @@ impl Texture {
         Self::with_levels(name.into(), TextureLevel::new(size, Texels::Vectors16(texels)))
     }
 
-    /// Whether nearly all texels, as they stand, are unit vectors on the side of blue, as those of normal maps are.
+    /// Whether nearly all texels, as they stand, are unit vectors nearer to blue than to red and green, as those of normal maps
+    /// are and colours are not.
     pub fn looks_like_normals(&self) -> bool {
-        let is_normal = |shares: Rgb| {
-            let v = shares * 2.0 - Rgb::ONE;
-            // A grey of such a length, and what is nearly one, is as far along red and green.
-            (v.length() - 1.0).abs() < 0.1 && v.z > v.x.max(v.y) + 0.1
-        };
+        // A grey of such a length, and what is nearly one, is as far along red and green.
+        self.are_mostly(|v| (v.length() - 1.0).abs() < 0.1 && v.z > v.x.max(v.y) + 0.1)
+    }
+
+    /// The same of maps that may be steep: unit vectors on the side of blue, but no greys.
+    pub fn may_be_normals(&self) -> bool {
+        let is_grey = |v: Vec3| (v - Vec3::splat(v.z)).abs().max_element() < 0.1;
+        self.are_mostly(|v| (v.length() - 1.0).abs() < 0.1 && v.z > 0.0 && !is_grey(v))
+    }
+
+    /// Whether nearly all texels, as they stand, are the shares of vectors that pass.
+    fn are_mostly(&self, passes: impl Fn(Vec3) -> bool + Sync) -> bool {
+        let is_normal = |shares: Rgb| passes(shares * 2.0 - Rgb::ONE);
         let eight = |c: &[u8; 3]| is_normal(Rgb::from_array(c.map(f32::from)) / 255.0);
         let (normals, all) = match &self.levels[0].texels {
             Texels::Srgb(codes) | Texels::Vectors8(codes) => {
@@ -538,6 +547,11 @@ mod tests {
             assert!(!looks([grey; 3]), "{grey}");
         }
         assert!(!looks([200, 200, 208]) && !looks([210, 200, 200]) && !looks([0, 128, 128]));
+        let may =
+            |texel: [u8; 3]| Texture::from_vectors8("t", [2, 2], vec![texel; 4]).may_be_normals();
+        // Slopes of 0.9 and 2.
+        assert!(may([43, 128, 222]) && may([213, 128, 222]) && may([242, 128, 184]));
+        assert!((0..=255).all(|grey| !may([grey; 3])) && !may([200, 200, 208]));
     }
 
     #[test]

@@ -72,6 +72,8 @@ impl LightSource {
         if !self.sampler.is_seen() {
             return 1.0;
         }
+        // A face that sends the light of others counts as if its samples lay on all of them, lest narrow lobes show it alone.
+        let light = light / self.sampler.stands_for();
         // In this form for a light seen in its own plane, whose density is infinite.
         1.0 / (1.0 + lobe / (light * count))
     }

@@ -37,6 +37,8 @@ pub struct LightSampler {
     /// What the light emits: radiance of an area light and of the sky, intensity of a point or spot light,
     /// irradiance of a directional one.
     pub emission: Rgb,
+    /// The area of what sends its light over that of its shape: 1 but for faces that send the light of others too.
+    stands_for: f64,
     shape: Shape,
 }
 
@@ -81,12 +83,16 @@ impl LightSampler {
             Light::Spot(light) => (light.intensity, Shape::Spot(Spot::new(light))),
             Light::Sun(light) => (light.radiance, Shape::Sun(Sun::new(light))),
         };
-        Self { emission, shape }
+        let stands_for = match light {
+            Light::Face(light) => light.stands_for,
+            _ => 1.0,
+        };
+        Self { emission, stands_for, shape }
     }
 
     /// Prepares the constant sky.
     pub fn of_sky(sky: &Sky) -> Self {
-        Self { emission: sky.radiance, shape: Shape::Sky(SkyDome) }
+        Self { emission: sky.radiance, stands_for: 1.0, shape: Shape::Sky(SkyDome) }
     }
 
     /// Unshadowed irradiance at `p` with unit normal `n`, per unit of emission; 0 where no light can arrive.
@@ -131,6 +137,11 @@ impl LightSampler {
             | Shape::Sun(_)
             | Shape::Sky(_) => true,
         }
+    }
+
+    /// The area of what sends its light over that of its shape.
+    pub fn stands_for(&self) -> f64 {
+        self.stands_for
     }
 
     /// Whether rays can end on the light's surface, or leave the scene towards it.

@@ -90,13 +90,13 @@ impl ImageStore {
         }
         let texture = match role {
             Role::Colour => {
-                let (texture, is_cut) = texture::reflectances(name, decoded)?;
-                if is_cut {
+                let (texture, cut) = texture::reflectances(name, decoded)?;
+                if cut == Some(texture::CUT_COLOURS) {
                     self.cut.insert(image);
                 }
                 Some(texture)
             }
-            Role::Light => Some(texture::colours(name, decoded)?),
+            Role::Light => Some(texture::colours(name, decoded)?.0),
             Role::Share(channel) => Some(texture::data(name, decoded, channel)?),
             Role::Normals => Some(texture::normals(name, decoded)?),
             Role::Mask(_) => None,

@@ -137,6 +137,8 @@ impl<'a> Builder<'a> {
         };
         let environment = sky.environment(kind);
         if let (Shown::Image(file), EnvironmentKind::Image(image)) = (&shown, &environment.kind) {
+            let doubt = self.images.doubt(&self.beside(file), ImageUse::Light);
+            self.warnings.extend(doubt.map(|doubt| self.source.fault(&file.span, doubt)));
             let brightest = scene::brightest(&self.world.textures[*image as usize]);
             let seen = f64::from(brightest) * f64::from(environment.strength);
             let name = &file.value;

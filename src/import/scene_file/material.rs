@@ -46,8 +46,7 @@ pub(super) struct Material {
     /// Glass, clear or absorbing.
     pub glass: Option<At<Glass>>,
     /// Emitted radiance, W/(m² sr), linear RGB or one number for grey. Absent: 0, or 1 where there is an `emission_texture`.
-    /// Spheres and meshes then light the scene, of a mesh the 4096 brightest faces, where these send half of its light; those with
-    /// `alpha` only glow.
+    /// Spheres and meshes then light the scene; a sphere with `alpha` only glows.
     pub emission: Option<Amount>,
     /// Image file, relative to the scene file, that multiplies `emission`, or a table of the file and how it lies on the
     /// surface. A sphere with it only glows.

@@ -1,6 +1,5 @@
 //! OpenEXR files of one channel, as programs write roughness and masks: [`image`] reads those with red, green and blue.
 
-use super::{MAX_IMAGE_BYTES, MAX_IMAGE_EDGE, too_large};
 use crate::error::{Error, Result};
 use exr::meta::MetaData;
 use exr::prelude::{ReadChannels, ReadLayers, read};
@@ -8,8 +7,6 @@ use image::{DynamicImage, Rgb32FImage};
 use std::io::Cursor;
 use std::path::Path;
 
-/// Bytes of a pixel as it is decoded: three floats.
-const PIXEL: u64 = 12;
 /// What such a file begins with.
 const MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
 
@@ -26,15 +23,11 @@ pub(super) fn size(bytes: &[u8]) -> Option<(u32, u32)> {
     Some((u32::try_from(size.0).ok()?, u32::try_from(size.1).ok()?)).filter(|_| is_grey)
 }
 
-/// The picture, grey; `None` as of [`size`].
+/// The picture, grey; `None` as of [`size`], which was held against the limits.
 ///
-/// Errors: `Error::Input` for a file that ends early or is damaged, or of too many pixels, before memory is asked for.
+/// Errors: `Error::Input` for a file that ends early or is damaged.
 pub(super) fn decode(path: &Path, bytes: &[u8]) -> Result<Option<DynamicImage>> {
     let Some((width, height)) = size(bytes) else { return Ok(None) };
-    let bytes_of_all = u64::from(width) * u64::from(height) * PIXEL;
-    if bytes_of_all > MAX_IMAGE_BYTES || width.max(height) > MAX_IMAGE_EDGE {
-        return Err(too_large(path, (width, height)));
-    }
     let unreadable = |what: String| Error::input(path, format!("not a readable image: {what}"));
     let reader = read().no_deep_data().largest_resolution_level().all_channels();
     let reader = reader.first_valid_layer().all_attributes().non_parallel();

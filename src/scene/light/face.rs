@@ -9,10 +9,12 @@ use serde::{Deserialize, Serialize};
 /// A face of a mesh that emits, or a part of one, scene space. Rays see the mesh, which may reflect light too.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FaceLight {
-    /// What emits, with the mean of its radiance.
+    /// What emits, with the mean of its radiance; `stands_for` times that where it sends the light of others too.
     pub part: QuadLight,
     /// Corners of the triangle of the mesh that it is a part of, or of one of two.
     pub triangle: [DVec3; 3],
+    /// The area of all faces whose light it sends over its own: 1 of what sends its own light alone.
+    pub stands_for: f64,
 }
 
 impl LightData for FaceLight {

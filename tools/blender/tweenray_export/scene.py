@@ -61,6 +61,7 @@ def write(scene, folder):
         # Materials, world and settings are read as they are in the file, to which animated values are written here.
         scene.frame_set(scene.frame_start)
         export.note_settings()
+        export.settings = export.settings_table()
         export.sky = export.world.prepare(scene)
         for name in switches:
             setattr(render, name, False)
@@ -89,7 +90,7 @@ class Export:
         self.materials = Materials(images, self.report)
         self.meshes = Meshes(folder, self.materials, self.report)
         self.world = World(images, self.report)
-        self.sky, self.error = None, None
+        self.settings, self.sky, self.error = None, None, None
         self.records, self.placed, self.lamps = [], [], []
         self.used, self.clipping = set(), None
 
@@ -239,7 +240,7 @@ class Export:
         """The scene file."""
         frames = f"frames {self.scene.frame_start} to {self.scene.frame_end}"
         parts = [f"# {toml.value(self.scene.name)} from Blender {bpy.app.version_string}, {frames}\n"]
-        parts += [toml.table("[settings]", self.settings()), camera_text(self.records)]
+        parts += [toml.table("[settings]", self.settings), camera_text(self.records)]
         if self.sky:
             parts.append(toml.table("[sky]", self.sky))
         parts += [toml.table("[[light]]", lamp) for lamp in self.lamps]
@@ -256,7 +257,7 @@ class Export:
             parts.append(toml.table("[[mesh]]", entries))
         return "\n".join(parts)
 
-    def settings(self):
+    def settings_table(self):
         """Image size, frame rate, exposure, tone curve, bounces, and the pixel filter of Cycles."""
         scene, render = self.scene, self.scene.render
         if render.use_motion_blur:
