@@ -3,6 +3,8 @@
 //! A pair of random numbers is a function of seed, frame, pixel, sample and dimension
 //! ([`PixelSampler`](crate::sampling::PixelSampler)). Two uses of one pixel's sampler never share a dimension.
 
+use crate::sampling::mix;
+
 /// The place of a camera sample in its pixel. This, [`LENS`] and [`of_lobe`] are of the pixel's own sampler: paths do
 /// not depend on the frame, so that reuse compares the same surface points. Lights' are of the frame's sampler.
 pub(super) const FILM: u32 = 0;
@@ -13,14 +15,20 @@ pub(super) const LENS: u32 = 1;
 /// The branch of a path that a camera ray is.
 pub(super) const ROOT: u32 = 1;
 
-/// The branch that the `child`th direction, 0 to 2, of all lobes leads to from the end of `branch`. The tree is at
-/// most 31 deep before branches share dimensions, or 20 where there are third directions, which have numbers of their own.
+/// The branch that the `child`th direction, 0 to 2, of all lobes leads to from the end of `branch`. Branches of a tree 31 deep,
+/// or 20 where there are third directions, which have numbers of their own, have different numbers; deeper ones have random
+/// ones, so that no path meets the same random number again and again.
 pub(super) fn branch(branch: u32, child: u32) -> u32 {
+    const DEEP: u32 = 1 << 31;
     let number = match child {
         2 => 1 << 20,
         _ => child,
     };
-    branch.wrapping_mul(2).wrapping_add(number)
+    if branch < DEEP {
+        branch.wrapping_mul(2).wrapping_add(number)
+    } else {
+        mix(u64::from(branch) << 2 | u64::from(child)) as u32 | DEEP
+    }
 }
 
 /// The direction that a lobe at the end of a branch is sampled in, of which the first is the `child`th of all: counted from
@@ -49,4 +57,22 @@ pub(super) fn of_fog(lights: usize) -> usize {
 pub(super) fn of_tail(branch: u32, lights: usize) -> [u32; 2] {
     // The sky's number, and those of fog, come before.
     [lights as u32 - 1, lights as u32].map(|number| of_light(branch, number, lights))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn deep_paths_do_not_meet_the_same_numbers_again() {
+        for child in [0, 1, 2] {
+            let mut branches = BTreeSet::new();
+            let mut deepest = ROOT;
+            for _ in 0..1024 {
+                deepest = branch(deepest, child);
+                assert!(branches.insert(deepest), "{} deep", branches.len());
+            }
+        }
+    }
 }
