@@ -312,6 +312,27 @@ fn cut_outs_that_emit_light_as_black_texels_do() {
     }
 }
 
+/// Rays see a mesh whole that has no texture coordinates, or one place for all corners, whatever its mask.
+#[test]
+fn cut_outs_without_coordinates_light_as_what_is_whole() {
+    let lit = |with_mask: bool, uvs: Option<Corners<Vec2>>| {
+        let mut world = lit_floor(|_, _| 3.0, 0.6, 1);
+        world.masks.push(AlphaMask { name: "none".into(), width: 1, height: 1, texels: vec![0] });
+        let panel = &mut world.materials[1];
+        panel.emission_map = None;
+        panel.alpha = with_mask.then(|| TextureMap::of(0));
+        let floor = world.meshes[1].positions.len();
+        world.meshes[1].uvs = uvs.map(|uvs| Corners { values: vec![uvs.values[0]; floor], ..uvs });
+        let mut job = job(world, pose((3.0, 1.0, 0.0), (1.2, 0.0, 0.0)), 24, 18);
+        job.settings.shadow_samples = 4;
+        mean(&render(&job).0)
+    };
+    let whole = lit(false, None);
+    let one_place = Corners { values: vec![Vec2::splat(0.5)], corners: None };
+    assert!(whole > 0.01, "{whole}");
+    assert_eq!([lit(true, None), lit(true, Some(one_place))], [whole; 2]);
+}
+
 /// A ball of many faces lights the floor as the exact sphere does.
 #[test]
 fn a_fine_mesh_lights_as_the_sphere_that_it_stands_for() {

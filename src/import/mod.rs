@@ -38,7 +38,7 @@ pub use model::{
 };
 pub use normals::apply as apply_normals;
 pub use scene_file::schema;
-pub use texture::{MAX_IMAGE_PIXELS, load_texture};
+pub use texture::{MAX_IMAGE_BYTES, load_texture};
 
 use crate::error::{Diagnostic, Error, Result};
 use crate::scene::{JobOptions, Settings, Shot, World, limits};

@@ -8,17 +8,19 @@ mod grey_exr;
 use crate::error::{Diagnostic, Error, Result};
 use crate::math::{Rgb, srgb_decode};
 use crate::scene::Texture;
-use image::{DynamicImage, ImageFormat, ImageReader, Limits};
+use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
 use std::borrow::Cow;
 use std::io::Cursor;
 use std::path::Path;
 
-/// Most pixels of an image: 16384 x 16384, up to 4 GB as floats.
-pub const MAX_IMAGE_PIXELS: u64 = 1 << 28;
-/// Most pixels of an image whose file need not be as large as such images are.
-const FEW_PIXELS: u64 = 1 << 24;
-/// Pixels that a byte of a larger image's file stands for at most. Compression by deflate or runs reaches some hundreds.
-const PIXELS_A_BYTE: u64 = 4096;
+/// The largest image that is decoded, bytes of its own pixel format: 16384 x 16384 of 8 bits, half as many of floats.
+pub const MAX_IMAGE_BYTES: u64 = 2 << 30;
+/// Bytes of an image whose file need not be as large as such images' are.
+const FEW_BYTES: u64 = 64 << 20;
+/// Pixels that a byte of a larger image's file stands for at most: of one bit each, deflated.
+const PIXELS_A_BYTE: u64 = 8 * 1032;
+/// The same of Radiance HDR: runs of 127 in four channels of two bytes each.
+const HDR_PIXELS_A_BYTE: u64 = 16;
 /// Its longest edge, pixels.
 const MAX_IMAGE_EDGE: u32 = 1 << 16;
 
@@ -37,7 +39,7 @@ pub(super) enum ImageChannel {
 
 /// Reads an image: bmp, exr, hdr, jpeg, png, pnm, or tga. The content decides, but for tga, which the name tells.
 ///
-/// Errors: `Error::Io`; `Error::Input` for what is no such image or has more than [`MAX_IMAGE_PIXELS`], before memory is
+/// Errors: `Error::Io`; `Error::Input` for what is no such image or larger than [`MAX_IMAGE_BYTES`], before memory is
 /// asked for.
 pub fn load_texture(path: &Path) -> Result<Texture> {
     Ok(colours(path, &decode(path)?)?.0)
@@ -49,6 +51,9 @@ pub(super) const CUT_COLOURS: &str =
 
 /// What a warning says of negative numbers, which programs and lossy compression make beside steep edges.
 const CUT_NEGATIVES: &str = "numbers below 0 are cut to 0: no light is negative";
+/// What a warning says of both.
+const CUT_BOTH: &str =
+    "colours above 1 and below 0 are cut: no surface reflects more light than it receives";
 
 /// The colours of a decoded image, in codes of 8 bits if it has no more, and what a warning says of those that were cut.
 ///
@@ -93,7 +98,8 @@ fn colours_up_to(
     let is_bright = texels.iter().any(|c| c.max_element() > most);
     let is_negative = texels.iter().any(|c| c.min_element() < 0.0);
     let cut = match (is_bright, is_negative) {
-        (true, _) => Some(CUT_COLOURS),
+        (true, true) => Some(CUT_BOTH),
+        (true, false) => Some(CUT_COLOURS),
         (false, true) => Some(CUT_NEGATIVES),
         (false, false) => None,
     };
@@ -158,7 +164,7 @@ pub(super) fn decode(path: &Path) -> Result<DynamicImage> {
 /// The image whose file holds `bytes`, as [`decode`]; `path` names it.
 pub(super) fn decode_bytes(path: &Path, bytes: &[u8]) -> Result<DynamicImage> {
     let mut limits = Limits::default();
-    limits.max_alloc = Some(16 * MAX_IMAGE_PIXELS);
+    limits.max_alloc = Some(MAX_IMAGE_BYTES);
     limits.max_image_width = Some(MAX_IMAGE_EDGE);
     limits.max_image_height = Some(MAX_IMAGE_EDGE);
     // Some decoders ask for memory before they look at the limits: the size comes first.
@@ -195,25 +201,35 @@ fn is_whole_jpeg(bytes: &[u8]) -> bool {
 
 /// How many pixels the image has whose file holds `bytes`, by its header.
 ///
-/// Errors: what is no image, no pixels, more than [`MAX_IMAGE_PIXELS`], or far more than the file can hold.
+/// Errors: what is no image, no pixels, more than [`MAX_IMAGE_BYTES`], or far more than the file can hold.
 pub(super) fn pixels(path: &Path, bytes: &[u8]) -> Result<u64> {
-    let (width, height) = match grey_exr::size(bytes) {
-        Some(size) => size,
-        None => reader(path, bytes)?.into_dimensions().map_err(|error| unreadable(path, &error))?,
+    let (width, height, most, decoded) = match grey_exr::size(bytes) {
+        Some((width, height)) => {
+            let pixels = u64::from(width) * u64::from(height);
+            (width, height, PIXELS_A_BYTE, pixels.saturating_mul(grey_exr::PIXEL))
+        }
+        None => {
+            let reader = reader(path, bytes)?;
+            let is_hdr = reader.format() == Some(ImageFormat::Hdr);
+            let decoder = reader.into_decoder().map_err(|error| unreadable(path, &error))?;
+            let (width, height) = decoder.dimensions();
+            let most = if is_hdr { HDR_PIXELS_A_BYTE } else { PIXELS_A_BYTE };
+            (width, height, most, decoder.total_bytes())
+        }
     };
     let pixels = u64::from(width) * u64::from(height);
     let fault = Diagnostic::new(path, format!("an image of {width} x {height} pixels"));
     if pixels == 0 {
         return Err(fault.into());
     }
-    if pixels > MAX_IMAGE_PIXELS || width.max(height) > MAX_IMAGE_EDGE {
+    if decoded > MAX_IMAGE_BYTES || width.max(height) > MAX_IMAGE_EDGE {
         let help = format!(
-            "an image has at most {MAX_IMAGE_PIXELS} pixels, and {MAX_IMAGE_EDGE} along an edge: make it smaller"
+            "at most {MAX_IMAGE_BYTES} bytes can be decoded, and {MAX_IMAGE_EDGE} pixels along an edge: make it smaller"
         );
         return Err(fault.help(help).into());
     }
     let length = bytes.len() as u64;
-    if pixels > FEW_PIXELS && pixels > PIXELS_A_BYTE * length {
+    if decoded > FEW_BYTES && pixels > most * length {
         return Err(fault.help(format!("its file has only {length} bytes: it is damaged")).into());
     }
     Ok(pixels)
@@ -362,12 +378,11 @@ mod tests {
         let found = |width, height, length| {
             pixels(path, &file(width, height, length)).map_err(|error| error.to_string())
         };
-        assert_eq!(found(8192, 4096, 2 << 20), Ok(1 << 25));
-        assert_eq!(found(16_384, 16_384, 2 << 20), Ok(1 << 28));
+        assert_eq!(found(8192, 4096, 3 << 20), Ok(1 << 25));
         for (width, height, length, help) in [
-            (16_384, 16_385, 2 << 20, "at most 268435456 pixels"),
-            (65_537, 1, 2 << 20, "65536 along an edge"),
-            (8192, 4096, 200, "it is damaged"),
+            (16_384, 16_384, 32 << 20, "at most 2147483648 bytes"),
+            (65_537, 1, 2 << 20, "65536 pixels along an edge"),
+            (8192, 4096, 70_000, "it is damaged"),
             (100_000, 100_000, 200, "at most"),
         ] {
             let refused = found(width, height, length).expect_err("refused");

@@ -20,7 +20,7 @@ const MOST_PARTS: usize = 512;
 const SMALL: f64 = 0.01;
 /// Faces that together send this share of a mesh's light cast none: black that is nearly so would be thousands of lights.
 const LEAST: f64 = 1e-3;
-/// Rows of points by which a face with holes is averaged.
+/// Rows of points by which a part of a face with holes is averaged.
 const HOLE_ROWS: u32 = 32;
 /// The golden ratio, whose multiples have fractions that lie evenly.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
@@ -180,6 +180,40 @@ impl<'m> Emission<'m> {
         self.colour * mean_between(image, map, corners)
     }
 
+    /// The mean radiance of a part of face `at` of what has holes: of points in rows.
+    fn mean_there(&self, at: usize, part: Part, mask: &LaidMask<'_>) -> Rgb {
+        let triangle = self.mesh.triangles[at];
+        let corners_of = |uvs: Option<&Corners<Vec2>>| {
+            uvs.map(|uvs| uvs.get(at, triangle).map(|uv| uv.as_dvec2()))
+        };
+        let between = |[a, b, c]: [DVec2; 3], (u, v): (f64, f64)| a + (b - a) * u + (c - a) * v;
+        // Rays see a face whole that has no coordinates.
+        let of_mask = corners_of(mask.uvs(self.mesh)).filter(|[a, b, c]| a != b || b != c);
+        let image = self.image.map(|(image, map)| {
+            // Rays see the lower left corner where there are none.
+            let corners = corners_of(self.mesh.uv_set(map.uv_set)).unwrap_or_default();
+            (&image.levels()[0], map, corners)
+        });
+        // Fewer where a mesh has so many faces that some stand for others.
+        let is_fine = self.mesh.triangles.len() > MOST_FACE_LIGHTS;
+        let rows = if is_fine { HOLE_ROWS / 4 } else { HOLE_ROWS };
+        let mut sum = DVec3::ZERO;
+        for smaller in parts(rows) {
+            let middle = within(part, smaller).map(DVec2::from).iter().sum::<DVec2>() / 3.0;
+            let place = middle.into();
+            if of_mask.is_none_or(|uvs| mask.is_there(between(uvs, place).as_vec2())) {
+                sum += match &image {
+                    Some((level, map, corners)) => {
+                        let uv = between(*corners, place).as_vec2();
+                        level.bilinear(map.wrap, map.place(uv)).as_dvec3()
+                    }
+                    None => DVec3::ONE,
+                };
+            }
+        }
+        self.colour * (sum / f64::from(rows * rows)).as_vec3()
+    }
+
     /// Lights of groups of the `chosen` faces, of these `means` and `powers`, the first of which will be number `first` of the
     /// scene's. Each group has about as much power as any other, and each is one light: a face of it with the light of all, taken
     /// by power as samples would be. So the light is right from far away, and shadow rays end on the mesh.
@@ -207,7 +241,7 @@ impl<'m> Emission<'m> {
             }
             let group = || order[from..to].iter().map(|(_, at)| *at);
             // A share of the group's power along the order; any fixed one would prefer larger faces.
-            let mut left = power * (GOLDEN * lights.len() as f64).fract();
+            let mut left = power * (GOLDEN * (lights.len() as f64 + 0.5)).fract();
             let is_there = |at: &usize| {
                 left -= powers[*at];
                 left < 0.0
@@ -247,36 +281,6 @@ impl<'m> Emission<'m> {
             }
         }
         place
-    }
-
-    /// The same of what has holes.
-    fn mean_there(&self, at: usize, part: Part, mask: &LaidMask<'_>) -> Rgb {
-        let triangle = self.mesh.triangles[at];
-        // Rays see the lower left corner where there are no coordinates.
-        let corners_of = |uvs: Option<&Corners<Vec2>>| match uvs {
-            Some(uvs) => uvs.get(at, triangle).map(|uv| uv.as_dvec2()),
-            None => [DVec2::ZERO; 3],
-        };
-        let between = |[a, b, c]: [DVec2; 3], (u, v): (f64, f64)| a + (b - a) * u + (c - a) * v;
-        let of_mask = corners_of(mask.uvs(self.mesh));
-        let image = self.image.map(|(image, map)| {
-            (&image.levels()[0], map, corners_of(self.mesh.uv_set(map.uv_set)))
-        });
-        let mut sum = DVec3::ZERO;
-        for smaller in parts(HOLE_ROWS) {
-            let middle = within(part, smaller).map(DVec2::from).iter().sum::<DVec2>() / 3.0;
-            let place = middle.into();
-            if mask.is_there(between(of_mask, place).as_vec2()) {
-                sum += match &image {
-                    Some((level, map, corners)) => {
-                        let uv = between(*corners, place).as_vec2();
-                        level.bilinear(map.wrap, map.place(uv)).as_dvec3()
-                    }
-                    None => DVec3::ONE,
-                };
-            }
-        }
-        self.colour * (sum / f64::from(HOLE_ROWS * HOLE_ROWS)).as_vec3()
     }
 
     /// Into how many rows each of the `chosen` faces is cut, of which all send `total`.

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 /// Most lights of a mesh: each has bounds in the cells of lights. Of more faces one of each group sends the group's light.
-pub const MOST_FACE_LIGHTS: usize = 4096;
+pub(super) const MOST_FACE_LIGHTS: usize = 4096;
 
 /// Which light is where on a mesh.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]

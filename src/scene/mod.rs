@@ -46,7 +46,7 @@ pub use environment::{
     Daylight, Environment, EnvironmentKind, EnvironmentRadiance, IrradianceTable, RadianceTable,
     SceneEnvironment, SkyGradient, SunSky, brightness, image_place,
 };
-pub use face_lights::{FaceLights, MOST_FACE_LIGHTS};
+pub use face_lights::FaceLights;
 pub use fog::Fog;
 pub use job::JobOptions;
 pub use lens::{Focus, Lens, LensKey, ShotLens, ThinLens, ThinLensPath};

@@ -444,11 +444,15 @@ impl PointRow {
         wrap: [Wrap; 2],
         fraction: f32,
     ) -> Rgb {
+        let at = |point: u32| inside(wrap, self.first + self.step * point as f32);
+        let of = |level: &TextureLevel, texels, at| level.bilinear_of((texels, linear), wrap, at);
         let mut sum = Rgb::ZERO;
-        for point in 0..self.count {
-            let at = inside(wrap, self.first + self.step * point as f32);
-            let seen = fine.bilinear_of((texels[0], linear), wrap, at);
-            sum += seen.lerp(coarse.bilinear_of((texels[1], linear), wrap, at), fraction);
+        if fraction == 0.0 {
+            (0..self.count).for_each(|point| sum += of(fine, texels[0], at(point)));
+        } else {
+            for at in (0..self.count).map(at) {
+                sum += of(fine, texels[0], at).lerp(of(coarse, texels[1], at), fraction);
+            }
         }
         sum / self.count as f32
     }

@@ -16,8 +16,8 @@ pub(super) const LENS: u32 = 1;
 pub(super) const ROOT: u32 = 1;
 
 /// The branch that the `child`th direction, 0 to 2, of all lobes leads to from the end of `branch`. Branches of a tree 31 deep,
-/// or 20 where there are third directions, which have numbers of their own, have different numbers; deeper ones have random
-/// ones, so that no path meets the same random number again and again.
+/// or 20 where there are third directions, which have numbers of their own, have different numbers; those from number 2^31 on have random
+/// ones, lest a path meets the same random number at each further bounce.
 pub(super) fn branch(branch: u32, child: u32) -> u32 {
     const DEEP: u32 = 1 << 31;
     let number = match child {

@@ -369,6 +369,15 @@ fn extensions_that_are_not_read_are_named_once_each() {
 }
 
 #[test]
+fn blend_beside_transmission_hides_nothing() {
+    let (glass, model) = material(json!({
+        "alphaMode": "BLEND", "pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1, 0.3]},
+        "extensions": {"KHR_materials_transmission": {"transmissionFactor": 1}},
+    }));
+    assert!(glass.glass.is_some() && glass.alpha.is_none() && model.world.meshes.len() == 1);
+}
+
+#[test]
 fn variants_of_materials_are_named() {
     let mut file = File::triangle();
     let names = json!([{"name": "red"}, {"name": "blue"}]);

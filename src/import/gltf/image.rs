@@ -13,7 +13,7 @@ use std::borrow::Cow;
 use std::collections::{BTreeSet, HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
-/// Most pixels of all images of a file: 4 GB.
+/// Most pixels of all images of a file: 4 GB of 8 bits.
 const MOST_PIXELS: u64 = 1 << 30;
 
 /// What an image serves as.

@@ -102,7 +102,10 @@ pub(super) fn brighten(world: &mut World, path: &Path) -> Option<Diagnostic> {
     let message = format!(
         "the lights of the file are dim as candela and lux ({all:.2e} W/m² in the middle of the scene, where 3 show white as white): their numbers are taken as W/sr and W/m², as many viewers do"
     );
-    Some(Diagnostic::new(path, message).help("--exposure 0.001464 shows them as dim as they are"))
+    Some(
+        Diagnostic::new(path, message)
+            .help("give the lights in a scene file where they are meant to be so dim"),
+    )
 }
 
 /// Cosines of the angles up to which a spot is full and beyond which there is no light.

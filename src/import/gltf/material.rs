@@ -224,7 +224,9 @@ impl Parts<'_, '_> {
             if !glass.thin && is_mask && material.alpha.is_some() {
                 self.notes.add("alphaMode MASK of what has KHR_materials_volume is left out: a body of glass has no cut-outs", None);
             }
-            material.alpha = material.alpha.filter(|_| glass.thin && is_mask);
+            let is_cut = glass.thin && is_mask;
+            material.alpha = material.alpha.filter(|_| is_cut);
+            is_invisible &= is_cut;
             material = part_glass(material, glass, transmission);
         }
         Ok(Surfaced { material, is_invisible })

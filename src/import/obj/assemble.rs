@@ -7,7 +7,7 @@ use crate::import::model::Model;
 use crate::import::source::Fault;
 use crate::import::{emission, lamps, mtl, polygon, tidy};
 use crate::math::{DVec3, Rgb, Vec2, Vec3};
-use crate::scene::{Corners, MOST_FACE_LIGHTS, VertexColours, WorldMesh};
+use crate::scene::{Corners, VertexColours, WorldMesh};
 use rayon::prelude::*;
 use std::collections::HashMap;
 use std::ops::Range;
@@ -77,7 +77,7 @@ pub(super) fn assemble(
             Some((_, name)) => name,
             None => path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
         };
-        add(path, mesh, model);
+        add(mesh, model);
     }
     model.warnings.extend(tidy::warning(path, dropped));
     if model.world.meshes.is_empty() && model.world.lights.is_empty() {
@@ -87,24 +87,16 @@ pub(super) fn assemble(
 }
 
 /// Adds a mesh, or lights in its place where it emits and is simple enough.
-fn add(path: &Path, mesh: WorldMesh, model: &mut Model) {
+fn add(mesh: WorldMesh, model: &mut Model) {
     let material = &model.world.materials[mesh.material as usize];
     let radiance = material.emission;
     if radiance == Rgb::ZERO {
         model.world.meshes.push(mesh);
-    } else if material.alpha.is_some() {
-        let message = format!(
-            "`{}` emits and has cut-outs (`map_d`): it glows but lights nothing",
-            mesh.name
-        );
-        model.warnings.push(Diagnostic::new(path, message));
-        model.world.meshes.push(mesh);
     } else {
         let lights = emission::is_mere_light(material).then(|| lamps::of_mesh(&mesh, radiance));
         let lights = lights.flatten();
-        // Faces of what also reflects are lights; whether those of an image are, its texels say.
-        let has_lit_faces =
-            material.emission_map.is_none() && mesh.triangles.len() <= MOST_FACE_LIGHTS;
+        // Faces of what also reflects are lights; whether those of an image or with holes are, its texels say.
+        let has_lit_faces = material.emission_map.is_none() && material.alpha.is_none();
         model.has_lamps |= lights.is_some() || has_lit_faces;
         match lights {
             Some(lights) => model.world.lights.extend(lights),

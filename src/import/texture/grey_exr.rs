@@ -7,6 +7,8 @@ use image::{DynamicImage, Rgb32FImage};
 use std::io::Cursor;
 use std::path::Path;
 
+/// Bytes of a pixel as it is decoded: three floats.
+pub(super) const PIXEL: u64 = 12;
 /// What such a file begins with.
 const MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
 

@@ -19,7 +19,7 @@ class Images:
 
     def __init__(self, folder, report):
         self.folder, self.report = folder, report
-        self._files, self._names = {}, set()
+        self._files, self._names, self._transparent = {}, set(), {}
 
     def colour(self, image, times_alpha=False):
         """The file of an image of colours, `times_alpha` or as they are, or None where it has no pixels."""
@@ -111,8 +111,11 @@ class Images:
         return None if pixels is None else self._exr(image.name, pixels)
 
     def _is_transparent(self, image):
-        pixels = self._pixels(image) if image.channels == 4 else None
-        return pixels is not None and float(pixels[..., 3].min()) < 1.0
+        if image.name_full not in self._transparent:
+            # Of grey and of three channels of 8 bits there is no alpha to look at.
+            pixels = self._pixels(image) if image.channels == 4 and image.depth not in (8, 24) else None
+            self._transparent[image.name_full] = pixels is not None and float(pixels[..., 3].min()) < 1.0
+        return self._transparent[image.name_full]
 
     def _premultiplied(self, image):
         """Linear colours times alpha. Blender's pixels are of straight alpha where they are codes."""

@@ -49,6 +49,8 @@ def write(scene, folder):
     """
     if scene.camera is None:
         raise ValueError(f"{scene.name}: no camera; add one and make it active (Ctrl-0)")
+    if not hasattr(scene, "cycles"):
+        raise ValueError(f"{scene.name}: the add-on Cycles is off; switch it on in Edit, Preferences, Add-ons")
     os.makedirs(folder, exist_ok=True)
     export = Export(scene, folder)
     render = scene.render

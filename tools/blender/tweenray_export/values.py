@@ -143,8 +143,8 @@ class Reader:
         uv_map, steps = self.mapping(fed.input("Vector"))
         table |= steps
         # Cycles multiplies colours by alpha unless a node takes the alpha too.
-        is_opaque = channel is None and not node.outputs["Alpha"].is_linked and node.image.alpha_mode in ("STRAIGHT", "PREMUL")
-        return Laid(node.image, channel, table, uv_map, is_opaque)
+        times_alpha = channel is None and not node.outputs["Alpha"].is_linked and node.image.alpha_mode in ("STRAIGHT", "PREMUL")
+        return Laid(node.image, channel, table, uv_map, times_alpha)
 
     def mapping(self, place):
         """(name of the UV map or None, keys of the texture's table) of a texture's vector."""
