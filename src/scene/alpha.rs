@@ -60,6 +60,12 @@ impl LaidMask<'_> {
         mesh.uv_set(self.map.uv_set)
     }
 
+    /// Texels of the mask in an `area` of the surface's texture coordinates.
+    pub(super) fn texels(&self, area: f64) -> f64 {
+        let of_image = area * self.map.transform.matrix2.determinant().abs();
+        of_image * f64::from(self.mask.width) * f64::from(self.mask.height)
+    }
+
     /// Whether the surface is there at its texture coordinates `uv`.
     pub fn is_there(&self, uv: Vec2) -> bool {
         self.mask.is_there(self.map.wrap, self.map.place(uv))

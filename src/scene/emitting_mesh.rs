@@ -20,7 +20,7 @@ const MOST_PARTS: usize = 512;
 const SMALL: f64 = 0.01;
 /// Faces that together send this share of a mesh's light cast none: black that is nearly so would be thousands of lights.
 const LEAST: f64 = 1e-3;
-/// Rows of points by which a part of a face with holes is averaged.
+/// Most rows of points by which a part of a face with holes is averaged.
 const HOLE_ROWS: u32 = 32;
 /// The golden ratio, whose multiples have fractions that lie evenly.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
@@ -194,9 +194,23 @@ impl<'m> Emission<'m> {
             let corners = corners_of(self.mesh.uv_set(map.uv_set)).unwrap_or_default();
             (&image.levels()[0], map, corners)
         });
-        // Fewer where a mesh has so many faces that some stand for others.
+        // As many as there are texels, but for a mesh of so many faces that some stand for others.
+        let texels = |[a, b, c]: [DVec2; 3], size: [u32; 2]| {
+            let size = DVec2::from(size.map(f64::from));
+            0.5 * ((b - a) * size).perp_dot((c - a) * size).abs()
+        };
+        let of_part = part.map(DVec2::from);
+        let share = (of_part[1] - of_part[0]).perp_dot(of_part[2] - of_part[0]).abs();
+        let on_mask = of_mask.map_or(0.0, |uvs| mask.texels(texels(uvs, [1, 1])));
+        let on_image = image.as_ref().map_or(0.0, |(level, map, corners)| {
+            let uvs = corners.map(|uv| map.transform.transform_point2(uv));
+            texels(uvs, [level.width, level.height])
+        });
         let is_fine = self.mesh.triangles.len() > MOST_FACE_LIGHTS;
-        let rows = if is_fine { HOLE_ROWS / 4 } else { HOLE_ROWS };
+        let most = if is_fine { HOLE_ROWS / 4 } else { HOLE_ROWS };
+        let wanted = 2.0 * (share * on_mask.max(on_image)).sqrt();
+        // NaN counts as few.
+        let rows = wanted.max(4.0).min(f64::from(most)) as u32;
         let mut sum = DVec3::ZERO;
         for smaller in parts(rows) {
             let middle = within(part, smaller).map(DVec2::from).iter().sum::<DVec2>() / 3.0;
