@@ -23,3 +23,9 @@ class Report:
         lines = self.lines()
         head = "What tweenray cannot express as Blender does, and what was exported instead:\n\n"
         return head + "\n".join(lines) + "\n" if lines else "Everything was exported as it is.\n"
+
+
+def is_animated(block):
+    """Whether values of a data-block change with time."""
+    data = block and block.animation_data
+    return bool(data and (data.action or data.drivers or data.nla_tracks))

@@ -13,7 +13,7 @@ from . import axes, camera, lights, toml
 from .images import Images
 from .materials import DEFAULT, Materials
 from .meshes import Meshes, free_name
-from .report import Report
+from .report import Report, is_animated
 from .world import World
 
 # Object types without a surface, which are left out without a word.
@@ -123,8 +123,8 @@ class Export:
         self.records.append(camera.record(ob, depsgraph, size(self.scene), self.report))
 
     def note_moves(self, before, now, frame):
-        for name in before.keys() - now.keys():
-            self.report.add(name[0], "it disappears during the shot", f"it stays as at frame {frame}")
+        for key in (key for key in before if key not in now):
+            self.report.add(key[0], "it disappears during the shot", f"it stays as at frame {frame}")
         for key, matrix in now.items():
             name = key[0]
             if key not in before:
@@ -306,12 +306,6 @@ def size(scene):
     render = scene.render
     percent = render.resolution_percentage
     return max(render.resolution_x * percent // 100, 1), max(render.resolution_y * percent // 100, 1)
-
-
-def is_animated(block):
-    """Whether values of a data-block change with time."""
-    data = block and block.animation_data
-    return bool(data and (data.action or data.drivers or data.nla_tracks))
 
 
 def is_mesh_of_another(ob):

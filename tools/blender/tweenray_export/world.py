@@ -8,6 +8,7 @@ import bpy
 import numpy as np
 
 from .nodes import Place
+from .report import is_animated
 from .values import Reader
 
 # Size of the image that a world of other nodes is rendered to, and samples a pixel.
@@ -25,7 +26,7 @@ class World:
         world = scene.world
         if world is None:
             return None
-        if any(block and block.animation_data for block in (world, world.node_tree)):
+        if is_animated(world) or is_animated(world.node_tree):
             self.report.add(world.name, "the world is animated", f"as at frame {scene.frame_start}")
         if not world.cycles_visibility.camera:
             self.report.add(world.name, "a world that is invisible to the camera", "it is seen")
