@@ -116,7 +116,7 @@ impl Images {
         self.image(path, what)?.looks_like_normals
     }
 
-    /// Why the image may be meant for another use, if it may.
+    /// Why the image may be meant for another use, or what of it was cut, if anything.
     pub fn doubt(&mut self, path: &Path, what: ImageUse) -> Option<&'static str> {
         let Image { cut, looks_like_normals, .. } = *self.image(path, what)?;
         match (what, looks_like_normals.unwrap_or(false)) {

@@ -46,7 +46,7 @@ pub fn load_texture(path: &Path) -> Result<Texture> {
 }
 
 /// What a warning says of colours that [`reflectances`] cuts.
-pub(super) const CUT_COLOURS: &str =
+const CUT_COLOURS: &str =
     "colours above 1 are cut to 1: no surface reflects more light than it receives";
 
 /// What a warning says of negative numbers, which programs and lossy compression make beside steep edges.

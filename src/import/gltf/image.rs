@@ -10,7 +10,7 @@ use crate::scene::{AlphaMask, World};
 use image::DynamicImage;
 use rayon::prelude::*;
 use std::borrow::Cow;
-use std::collections::{BTreeSet, HashMap, HashSet};
+use std::collections::{BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 
 /// Most pixels of all images of a file: 4 GB of 8 bits.
@@ -35,8 +35,8 @@ pub(super) enum Role {
 pub(super) struct ImageStore {
     decoded: HashMap<usize, (PathBuf, DynamicImage)>,
     placed: HashMap<(usize, Role), Option<u32>>,
-    /// Images of which colours above 1 were cut.
-    cut: HashSet<usize>,
+    /// What a warning says of images of which reflectances were cut.
+    cut: HashMap<usize, &'static str>,
 }
 
 impl ImageStore {
@@ -91,9 +91,7 @@ impl ImageStore {
         let texture = match role {
             Role::Colour => {
                 let (texture, cut) = texture::reflectances(name, decoded)?;
-                if cut == Some(texture::CUT_COLOURS) {
-                    self.cut.insert(image);
-                }
+                self.cut.extend(cut.map(|cut| (image, cut)));
                 Some(texture)
             }
             Role::Light => Some(texture::colours(name, decoded)?.0),
@@ -116,10 +114,10 @@ impl ImageStore {
         Ok(number)
     }
 
-    /// The name of an image of which colours above 1 were cut.
-    pub fn cut(&self, image: usize) -> Option<&Path> {
-        let is_cut = self.cut.contains(&image);
-        self.decoded.get(&image).filter(|_| is_cut).map(|(name, _)| name.as_path())
+    /// The name of an image of which reflectances were cut, and what a warning says of it.
+    pub fn cut(&self, image: usize) -> Option<(&Path, &'static str)> {
+        let (name, _) = self.decoded.get(&image)?;
+        Some((name, *self.cut.get(&image)?))
     }
 
     /// Whether an image has an alpha channel with anything that is not opaque.

@@ -7,7 +7,7 @@ use super::node::name_of;
 use super::texture_info::{LaidImage, TextureTable};
 use crate::error::Result;
 use crate::import::source::Notes;
-use crate::import::texture::{CUT_COLOURS, ImageChannel};
+use crate::import::texture::ImageChannel;
 use crate::math::Rgb;
 use crate::scene::{Fresnel, Glass, Material, NormalMap, TextureMap, World};
 use std::collections::BTreeSet;
@@ -177,9 +177,9 @@ impl<'d> MaterialReader<'d> {
         let mut parts = Parts { json, laid, uv_sets, images, world, notes };
         let mut surfaced = parts.read(coloured)?;
         surfaced.material.name = name_of(json, "material", at)?;
-        if let Some(image) = base.and_then(|base| images.cut(base.image)) {
+        if let Some((image, cut)) = base.and_then(|base| images.cut(base.image)) {
             let (name, image) = (&surfaced.material.name, image.display());
-            notes.add(&format!("material `{name}`: baseColorTexture {image}: {CUT_COLOURS}"), None);
+            notes.add(&format!("material `{name}`: baseColorTexture {image}: {cut}"), None);
         }
         Ok(surfaced)
     }
