@@ -369,7 +369,8 @@ impl<'a> Builder<'a> {
 
     fn warn_of_hidden_light(&mut self, fog: &At<Fog>) {
         let World { fog: built, lights, sky, environment, .. } = &self.world;
-        let is_everywhere = built.as_ref().is_some_and(|fog| fog.bounds.is_none());
+        let is_everywhere =
+            built.as_ref().is_some_and(|fog| fog.bounds.is_none() && fog.extinction > 0.0);
         let is_outside = |light: &scene::Light| light.far_field().place().is_none();
         let is_bright = sky.radiance.max_element() > 0.0 || environment.is_some();
         if is_everywhere && (is_bright || lights.iter().any(is_outside)) {

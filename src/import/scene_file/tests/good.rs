@@ -185,6 +185,17 @@ fn skies_come_in_kinds() {
 }
 
 #[test]
+fn fog_that_is_everywhere_is_said_to_hide_the_sky() {
+    let warns = |fog: &str| {
+        let loaded = good(&format!("[sky]\nradiance = 1\n[fog]\n{fog}"));
+        loaded.warnings.iter().any(|w| w.message.contains("hides the sky"))
+    };
+    assert!(warns("extinction = 0.1"));
+    assert!(!warns("extinction = 0.1\nbox = { min = [0, 0, 0], max = [1, 1, 1] }"));
+    assert!(!warns("extinction = 0"));
+}
+
+#[test]
 fn paths_come_in_five_kinds() {
     let path = |text: &str| good(&format!("[camera]\nroll = 5\nup = 'z'\n{text}\n")).shot;
     let still = path("still = { eye = [9, 0, 0], target = [0, 0, 0] }");
