@@ -84,6 +84,15 @@ class Lights(Case):
         self.near([sky["sky"]["rotate"], sky["sky"]["strength"]], [230.0, 2.0], 1e-4)
         self.assertTrue(os.path.getsize(os.path.join(folder, sky["sky"]["image"])) > 1000)
 
+    def test_alpha_multiplies_an_image_of_the_sky(self):
+        tree = stage.fresh().world.node_tree
+        node = tree.nodes.new("ShaderNodeTexEnvironment")
+        node.image = stage.picture("thin", np.full((1, 2, 4), 0.5, dtype=np.float32), "Linear Rec.709")
+        tree.links.new(node.outputs["Color"], tree.nodes["Background"].inputs["Color"])
+        found, _, folder = export("thin-sky")
+        image = bpy.data.images.load(os.path.join(folder, found["sky"]["image"]))
+        self.near(image.pixels[:3], [0.25] * 3, 0.01)
+
     def test_other_worlds_are_rendered_into_an_image(self):
         from tweenray_export import world
 

@@ -6,9 +6,14 @@ import os
 import bpy
 import numpy as np
 
-from common import Case, export, ply
+from common import FOLDER, Case, export, ply
 
 import stage
+
+
+def light_of(code):
+    """Linear light of an sRGB code above 0.04."""
+    return ((code + 0.055) / 1.055) ** 2.4
 
 
 class Materials(Case):
@@ -269,14 +274,226 @@ class Materials(Case):
             file = table["principled"]["base_texture"]
             return bpy.data.images.load(os.path.join(self.folder, file)).pixels[0]
 
-        # Its colour counts times its alpha where no node takes that.
-        self.near(shown(self.of(painted("STRAIGHT"))[0]), 0.5, 0.01)
+        # Its codes count times its alpha where no node takes that.
+        self.near(shown(self.of(painted("STRAIGHT"))[0]), light_of(128.0 / 255.0), 0.01)
         table, _ = self.of(painted("STRAIGHT", True))
         self.near(shown(table), 1.0, 0.01)
         self.assertIn("alpha", table)
         table, _ = self.of(painted("NONE", True))
         self.near(shown(table), 1.0, 0.01)
         self.assertNotIn("alpha", table)
+
+    def written(self, file, channels=4):
+        """The numbers of a file as it stores them, (rows, columns, channels), row 0 at the bottom."""
+        image = bpy.data.images.load(os.path.join(self.folder, file))
+        image.colorspace_settings.name = "Non-Color"
+        width, height = image.size
+        return np.array(image.pixels[:]).reshape(height, width, 4)[..., :channels]
+
+    def of_16_bits(self, colour_space, pixels, to, alpha_to=None):
+        """A principled material whose input `to` shows a PNG of 16 bits that holds `pixels`."""
+        from tweenray_export.images import png
+
+        def link(tree, node, shader):
+            path = os.path.join(FOLDER, "sixteen.png")
+            with open(path, "wb") as file:
+                file.write(png(np.rint(65535.0 * pixels).astype(">u2")))
+            node.image = bpy.data.images.load(path)
+            node.image.colorspace_settings.name = colour_space
+            tree.links.new(node.outputs["Color"], shader.inputs[to])
+            shader.inputs["Emission Strength"].default_value = 1.0
+            if alpha_to:
+                tree.links.new(node.outputs["Alpha"], shader.inputs[alpha_to])
+
+        return self.of(lambda: self.mapped("t", "sRGB", pixels, link))
+
+    def test_16_bits_of_linear_colours_become_floats(self):
+        pixels = np.ones((1, 2, 4), dtype=np.float32)
+        pixels[0, 0, :3] = (0.2, 0.6, 0.0)
+        linear = [[(0.2, 0.6, 0.0), (1.0, 1.0, 1.0)]]
+        decoded = [[(light_of(0.2), light_of(0.6), 0.0), (1.0, 1.0, 1.0)]]
+        for space, light in (("Non-Color", linear), ("Linear Rec.709", linear), ("sRGB", decoded)):
+            table, lines = self.of_16_bits(space, pixels, "Base Color")
+            file = table["principled"]["base_texture"]
+            self.assertEqual((file[-4:], lines), (".exr", []))
+            self.near(self.written(file, 3), light, 1e-3)
+            table, _ = self.of_16_bits(space, pixels, "Emission Color")
+            self.near(self.written(table["emission_texture"], 3), light, 1e-3)
+        table, lines = self.of_16_bits("Non-Color", pixels, "Roughness")
+        self.assertEqual((table["principled"]["roughness"]["file"][-4:], lines), (".png", []))
+
+    def test_16_bits_are_as_bright_where_a_node_takes_their_alpha(self):
+        pixels = np.full((1, 2, 4), 0.6, dtype=np.float32)
+        table, _ = self.of_16_bits("sRGB", pixels, "Base Color", "Alpha")
+        self.near(self.written(table["principled"]["base_texture"], 3), np.full((1, 2, 3), light_of(0.6)), 1e-3)
+        # Else the code 0.36 is shown, as in Cycles.
+        table, _ = self.of_16_bits("sRGB", pixels, "Base Color")
+        self.near(self.written(table["principled"]["base_texture"], 3), np.full((1, 2, 3), light_of(0.36)), 1e-3)
+
+    def test_alpha_leaves_images_of_numbers_alone(self):
+        pixels = np.full((1, 1, 4), 0.5, dtype=np.float32)
+        link = lambda tree, node, shader: tree.links.new(node.outputs["Color"], shader.inputs["Base Color"])
+        table, _ = self.of(lambda: self.mapped("t", "Non-Color", pixels, link))
+        self.near(self.written(table["principled"]["base_texture"], 3), [[[128.0 / 255.0] * 3]], 1e-3)
+
+    def test_vertex_colours_of_numbers_are_reported(self):
+        inputs = {"Alpha": 1.0, "Metallic": 0.25, "Roughness": 0.5, "Transmission Weight": 0.0}
+
+        def made():
+            material = stage.principled("v", Metallic=0.25)
+            tree = material.node_tree
+            node = tree.nodes.new("ShaderNodeVertexColor")
+            for name in inputs:
+                tree.links.new(node.outputs["Color"], tree.nodes["Principled BSDF"].inputs[name])
+            return material
+
+        table, lines = self.of(made)
+        for name in inputs:
+            self.noted(lines, "v", f"{name} from the node", "VERTEX_COLOR", "own value")
+        self.near([table["principled"][key] for key in ("metallic", "roughness")], [0.25, 0.5])
+        self.assertNotIn("transmission", table["principled"])
+
+    def test_masks_cut_by_the_grey_that_blender_sees(self):
+        pixels = np.ones((1, 4, 4), dtype=np.float32)
+        pixels[0, :, :3] = [(0.6, 0.6, 0.6), (1.0, 1.0, 1.0), (1.0, 0.0, 0.0), (1.0, 1.0, 1.0)]
+        pixels[0, 3, 3] = 0.0
+        # Code 0.6 is less than half the light, and what is transparent is black.
+        grey = [light_of(0.6), 1.0, 0.2126, 0.0]
+
+        def cut(tree, node, shader):
+            tree.links.new(node.outputs["Color"], shader.inputs["Alpha"])
+
+        def mixed(tree, node, shader):
+            mix, clear = tree.nodes.new("ShaderNodeMixShader"), tree.nodes.new("ShaderNodeBsdfTransparent")
+            out = next(n for n in tree.nodes if n.type == "OUTPUT_MATERIAL")
+            for one, other in ((node.outputs["Color"], 0), (clear.outputs[0], 1), (shader.outputs[0], 2)):
+                tree.links.new(one, mix.inputs[other])
+            tree.links.new(mix.outputs[0], out.inputs["Surface"])
+
+        for link in (cut, mixed):
+            table, lines = self.of(lambda: self.mapped("t", "sRGB", pixels, link))
+            self.near(self.written(table["alpha"])[0, :, 0], grey, 2e-3)
+            self.near(self.written(table["alpha"])[0, :, 3], [1.0] * 4)
+            self.noted(lines, "cut-outs")
+
+        def red(tree, node, shader):
+            channels = tree.nodes.new("ShaderNodeSeparateColor")
+            tree.links.new(node.outputs["Color"], channels.inputs[0])
+            tree.links.new(channels.outputs["Red"], shader.inputs["Alpha"])
+
+        table, _ = self.of(lambda: self.mapped("t", "sRGB", pixels, red))
+        self.near(self.written(table["alpha"])[0, :, 0], [grey[0], 1.0, 1.0, 0.0], 2e-3)
+
+    def test_an_opaque_image_cuts_nothing(self):
+        """Scene files would cut by its colours."""
+        black = np.zeros((2, 2, 4), dtype=np.float32)
+        black[..., 3] = 1.0
+        link = lambda tree, node, shader: tree.links.new(node.outputs["Alpha"], shader.inputs["Alpha"])
+        table, lines = self.of(lambda: self.mapped("t", "sRGB", black, link))
+        self.assertNotIn("alpha", table)
+        self.assertEqual(lines, [])
+
+        def lost(tree, node, shader):
+            node.image = bpy.data.images.new("lost", 2, 2)
+            node.image.source, node.image.filepath = "FILE", "//no-such-file.png"
+            link(tree, node, shader)
+
+        table, lines = self.of(lambda: self.mapped("t", "sRGB", black, lost))
+        self.assertNotIn("alpha", table)
+        self.noted(lines, "lost", "no pixels")
+
+    def normals(self, scale, turn, pixels, extension="REPEAT"):
+        """(table, report) of a normal map below a Mapping node."""
+        def link(tree, node, shader):
+            mapping, place, normal = (tree.nodes.new(kind) for kind in ("ShaderNodeMapping", "ShaderNodeTexCoord", "ShaderNodeNormalMap"))
+            mapping.inputs["Scale"].default_value, mapping.inputs["Rotation"].default_value = (*scale, 1.0), (0.0, 0.0, turn)
+            tree.links.new(place.outputs["UV"], mapping.inputs["Vector"])
+            tree.links.new(mapping.outputs["Vector"], node.inputs["Vector"])
+            tree.links.new(node.outputs["Color"], normal.inputs["Color"])
+            tree.links.new(normal.outputs["Normal"], shader.inputs["Normal"])
+            node.extension = extension
+
+        return self.of(lambda: self.mapped("t", "Non-Color", pixels, link))
+
+    def test_normals_keep_to_the_uv_map_below_a_mapping_node(self):
+        pixels = np.ones((1, 1, 4), dtype=np.float32)
+        pixels[0, 0, :3] = np.array([204.0, 153.0, 230.0]) / 255.0
+        x, y = 0.6, 0.2
+        # Along the axes of an image that lies so. Of quarter turns and mirrored axes it is exact, whatever the UV map.
+        cases = [((1.0, 1.0), 0.0, (x, y), 0), ((2.0, 3.0), 0.0, (x, y), 0), ((1.0, -1.0), 0.0, (x, -y), 0), ((-1.0, 1.0), 0.0, (-x, y), 0)]
+        cases += [((-2.0, -3.0), 0.0, (-x, -y), 0), ((1.0, 1.0), 0.5 * math.pi, (-y, x), 0)]
+        c, s = math.cos(0.5), math.sin(0.5)
+        cases += [((1.0, 1.0), 0.5, (c * x - s * y, s * x + c * y), 1), ((-2.0, 2.0), 0.5, (-c * x - s * y, -s * x + c * y), 1)]
+        for scale, turn, expected, notes in cases:
+            table, lines = self.normals(scale, turn, pixels)
+            found = 2.0 * self.written(table["normal_map"]["file"])[0, 0, :3] - 1.0
+            self.near(found, [*expected, 2.0 * 230.0 / 255.0 - 1.0], 1e-3)
+            self.assertEqual(len(lines), notes, lines)
+        self.noted(lines, "t", "normal map", "turned")
+        _, lines = self.normals((1.0, 1.0), 0.0, pixels, "MIRROR")
+        self.noted(lines, "t", "normal map", "mirrored at its edges")
+
+    def test_how_an_image_node_looks_up_is_reported(self):
+        def closest(node):
+            node.interpolation = "Closest"
+
+        def moved(node):
+            node.texture_mapping.translation = (0.5, 0.0, 0.0)
+
+        def mapped(node):
+            node.id_data.links.new(node.id_data.nodes.new("ShaderNodeMapping").outputs["Vector"], node.inputs["Vector"])
+
+        for change, word in ((closest, "interpolation Closest"), (moved, "texture mapping"), (mapped, "texture coordinates from Mapping")):
+            def link(tree, node, shader):
+                tree.links.new(node.outputs["Color"], shader.inputs["Base Color"])
+                change(node)
+
+            _, lines = self.of(lambda: self.mapped("t", "sRGB", np.ones((2, 2, 4), dtype=np.float32), link))
+            self.assertEqual(len(lines), 1, lines)
+            self.noted(lines, "t", word)
+
+    def test_factors_above_1_are_multiplied_into_images(self):
+        def multiplied(tree, one, factor):
+            mix = tree.nodes.new("ShaderNodeMix")
+            mix.data_type, mix.blend_type, mix.inputs["Factor"].default_value = "RGBA", "MULTIPLY", 1.0
+            a, b = [s for s in mix.inputs if s.enabled and s.type == "RGBA"]
+            b.default_value = (*factor, 1.0)
+            tree.links.new(one, a)
+            return next(s for s in mix.outputs if s.enabled)
+
+        pixels = np.ones((1, 1, 4), dtype=np.float32)
+        pixels[..., :3] = (51.0 / 255.0, 102.0 / 255.0, 204.0 / 255.0)
+
+        def coloured(factor):
+            return lambda tree, node, shader: tree.links.new(multiplied(tree, node.outputs["Color"], factor), shader.inputs["Base Color"])
+
+        table, lines = self.of(lambda: self.mapped("t", "Non-Color", pixels, coloured((0.5, 2.0, 1.0))))
+        p = table["principled"]
+        self.near(p["base_colour"], [1.0] * 3)
+        self.near(self.written(p["base_texture"])[0, 0, :3], [0.1, 0.8, 0.8], 1e-3)
+        self.assertEqual(lines, [])
+        _, lines = self.of(lambda: self.mapped("t", "Non-Color", pixels, coloured((0.5, 2.0, 2.0))))
+        self.noted(lines, "t-image", "above 1")
+
+        def metal(tree, node, shader):
+            math_node = tree.nodes.new("ShaderNodeMath")
+            math_node.operation, math_node.inputs[1].default_value = "MULTIPLY", 3.0
+            tree.links.new(node.outputs["Color"], math_node.inputs[0])
+            tree.links.new(math_node.outputs[0], shader.inputs["Metallic"])
+
+        pixels[..., :3] = 51.0 / 255.0
+        metallic = self.of(lambda: self.mapped("t", "Non-Color", pixels, metal))[0]["principled"]["metallic"]
+        self.near([self.written(metallic["file"])[0, 0, 1], metallic.get("factor", 1.0)], [0.6, 1.0], 1e-3)
+
+        def painted():
+            material = stage.principled("v")
+            tree = material.node_tree
+            node = tree.nodes.new("ShaderNodeVertexColor")
+            tree.links.new(multiplied(tree, node.outputs["Color"], (3.0, 3.0, 3.0)), tree.nodes["Principled BSDF"].inputs["Base Color"])
+            return material
+
+        _, lines = self.of(painted)
+        self.noted(lines, "v", "factor above 1 of vertex colours")
 
     def test_what_has_no_material_is_blenders_default(self):
         stage.fresh()

@@ -8,10 +8,15 @@ import zlib
 import bpy
 import numpy as np
 
-from .meshes import free_name
+from .meshes import free_name, to_srgb
 
 # Formats that tweenray reads, by the first bytes of a file.
 KNOWN = {b"\x89PNG": ".png", b"\xff\xd8\xff": ".jpg", b"BM": ".bmp", b"#?RA": ".hdr", b"v/1\x01": ".exr"}
+# Formats of floats, as Blender calls them. It gives the 16 bits of a PNG as floats, too.
+FLOATS = ("OPEN_EXR", "OPEN_EXR_MULTILAYER", "HDR")
+# Colour spaces of numbers, whose colours alpha never multiplies.
+DATA = ("Non-Color", "Raw")
+GREY = (0.2126, 0.7152, 0.0722)
 
 
 class Images:
@@ -23,40 +28,49 @@ class Images:
 
     def colour(self, image, times_alpha=False):
         """The file of an image of colours, `times_alpha` or as they are, or None where it has no pixels."""
-        if times_alpha and self._is_transparent(image):
-            return self._once(image, "premultiplied", lambda: self._premultiplied(image))
         space = image.colorspace_settings.name
-        as_codes = space == "sRGB" and not image.is_float
-        as_light = image.is_float and (space.startswith("Linear") or space == "Non-Color")
-        if as_codes or as_light:
-            return self._once(image, "colour", lambda: self._copy(image) or self._codes(image))
-        if space not in ("Non-Color", "Raw") and not space.startswith("Linear"):
+        # Blender decodes the floats of every space, but no codes other than sRGB.
+        if not image.is_float and space not in (*DATA, "sRGB", "Linear Rec.709"):
             self.report.add(image.name, f"colour space {space}", "taken as linear light")
+        if times_alpha and self.is_transparent(image):
+            return self._once(image, "premultiplied", lambda: self._light(image, True))
+        as_codes = space == "sRGB" and not image.is_float
+        if as_codes or (self._is_light(image) and not self._is_premultiplied(image)):
+            return self._once(image, "colour", lambda: self._copy(image) or self._codes(image))
         return self._once(image, "light", lambda: self._light(image))
+
+    def product(self, image, factor, times_alpha=False):
+        """The file of reflectances: an image's linear colours times three numbers, cut at 1; None where it has no pixels."""
+        return self._once(image, ("product", *factor, times_alpha), lambda: self._product(image, factor, times_alpha))
 
     def data(self, image):
         """The file of an image of numbers (roughness, normals), or None; grey is that of Rec. 709 where it is coloured."""
         space = image.colorspace_settings.name
-        if space in ("Non-Color", "Raw") or space.startswith("Linear"):
+        if space in DATA or space.startswith("Linear"):
             return self._once(image, "colour", lambda: self._copy(image) or self._codes(image))
         return self._once(image, "grey", lambda: self._linear_codes(image))
 
     def alpha(self, image):
-        """The file of an image whose alpha, or else colour, counts."""
+        """The file of an image whose alpha counts, which is not opaque all over."""
         return self._once(image, "colour", lambda: self._copy(image) or self._codes(image))
 
-    def luminance(self, image):
-        """The file of the grey that Blender makes of a coloured image's linear numbers, or None."""
-        return self._once(image, "luminance", lambda: self._luminance(image))
+    def grey(self, image, channel=None, factor=(1.0, 1.0, 1.0), times_alpha=False):
+        """The file of an image's linear colours times `factor` as grey: of one channel (r, g, b, a), or Blender's grey of all; cut at 1.
+        None where it has no pixels."""
+        kind = ("grey", channel, *factor, times_alpha)
+        return self._once(image, kind, lambda: self._grey(image, channel, factor, times_alpha))
 
-    def mean(self, image):
-        """The mean linear colour."""
-        pixels = self._pixels(image)
+    def normals(self, image, turn):
+        """The file of a normal map whose parts along u and v are multiplied by the matrix `turn`, or None."""
+        return self._once(image, ("normals", *turn[0], *turn[1]), lambda: self._normals(image, turn))
+
+    def mean(self, image, channel=None, times_alpha=False):
+        """The mean linear colour, or of one channel the mean three times."""
+        pixels = self._linear(image, times_alpha)
         if pixels is None:
             return [0.0, 0.0, 0.0]
-        if not image.is_float and image.colorspace_settings.name == "sRGB":
-            pixels = from_srgb(pixels)
-        return [float(x) for x in pixels[..., :3].mean(axis=(0, 1), dtype=np.float64)]
+        mean = [float(x) for x in pixels.mean(axis=(0, 1), dtype=np.float64)]
+        return mean[:3] if channel is None else [mean["rgba".index(channel)]] * 3
 
     def is_grey(self, image):
         """Whether red, green and blue are the same everywhere."""
@@ -106,42 +120,85 @@ class Images:
             return self._exr(image.name, pixels)
         return self._write(image.name, ".png", png(np.rint(255.0 * np.clip(pixels, 0.0, 1.0)).astype(np.uint8)))
 
-    def _light(self, image):
-        pixels = self._pixels(image)
+    def _light(self, image, times_alpha=False):
+        pixels = self._linear(image, times_alpha)
         return None if pixels is None else self._exr(image.name, pixels)
 
-    def _is_transparent(self, image):
+    def _is_light(self, image):
+        """Whether tweenray finds the linear colours in its file, which is of floats, as Blender does."""
+        is_of_floats = image.is_float and (image.source != "FILE" or image.file_format in FLOATS)
+        return is_of_floats and image.colorspace_settings.name in (*DATA, "Linear Rec.709")
+
+    def _is_premultiplied(self, image):
+        """Whether Blender's floats of the image are multiplied by an alpha below 1."""
+        is_meant = image.alpha_mode in ("STRAIGHT", "PREMUL") and image.colorspace_settings.name not in DATA
+        return image.is_float and is_meant and self.is_transparent(image)
+
+    def is_transparent(self, image):
+        """Whether its alpha is below 1 anywhere."""
         if image.name_full not in self._transparent:
-            # Of grey and of three channels of 8 bits there is no alpha to look at.
-            pixels = self._pixels(image) if image.channels == 4 and image.depth not in (8, 24) else None
+            # Of grey, of three channels of 8 bits, and of HDR files there is no alpha to look at.
+            has_alpha = image.channels == 4 and image.depth not in (8, 24) and image.file_format != "HDR"
+            pixels = self._pixels(image) if has_alpha else None
             self._transparent[image.name_full] = pixels is not None and float(pixels[..., 3].min()) < 1.0
         return self._transparent[image.name_full]
 
-    def _premultiplied(self, image):
-        """Linear colours times alpha. Blender's pixels are of straight alpha where they are codes."""
+    def is_opaque(self, image):
+        """Whether it has pixels, and no alpha below 1."""
+        return self._pixels(image) is not None and not self.is_transparent(image)
+
+    def _linear(self, image, times_alpha=False):
+        """Linear colours `times_alpha` or as they are, and alpha, or None. Cycles multiplies codes by alpha before it decodes them."""
         pixels = self._pixels(image)
-        if image.is_float:
-            return self._exr(image.name, pixels)
-        rgb = from_srgb(pixels[..., :3]) if image.colorspace_settings.name == "sRGB" else pixels[..., :3]
-        return self._exr(image.name, np.concatenate([rgb * pixels[..., 3:], pixels[..., 3:]], axis=2))
+        if pixels is None:
+            return None
+        rgb, alpha = pixels[..., :3], pixels[..., 3:]
+        if times_alpha and not image.is_float:
+            rgb = rgb * alpha
+        elif not times_alpha and self._is_premultiplied(image):
+            rgb = rgb / np.where(alpha > 0.0, alpha, 1.0)
+        elif times_alpha and self._is_of_16_bit_codes(image):
+            rgb = from_srgb(to_srgb(rgb / np.where(alpha > 0.0, alpha, 1.0)) * alpha)
+        if not image.is_float and image.colorspace_settings.name == "sRGB":
+            rgb = from_srgb(rgb)
+        return np.concatenate([rgb, alpha], axis=2)
+
+    def _is_of_16_bit_codes(self, image):
+        """Whether Cycles reads sRGB codes where Blender gives floats. Of packed files Cycles takes Blender's floats."""
+        is_of_codes = image.colorspace_settings.name == "sRGB" and image.file_format not in FLOATS
+        return image.is_float and is_of_codes and image.source == "FILE" and image.packed_file is None
+
+    def _product(self, image, factor, times_alpha):
+        pixels = self._linear(image, times_alpha)
+        if pixels is None:
+            return None
+        pixels[..., :3] *= np.array(factor, dtype=np.float32)
+        if float(pixels[..., :3].max()) > 1.0 + 1e-6:
+            self.report.add(image.name, "reflectances above 1 where a factor multiplies the image", "1")
+        pixels[..., :3] = np.clip(pixels[..., :3], 0.0, 1.0)
+        return self._exr(image.name, pixels)
 
     def _linear_codes(self, image):
-        pixels = self._pixels(image)
+        pixels = self._linear(image)
         if pixels is None:
             return None
-        if not image.is_float:
-            pixels = np.concatenate([from_srgb(pixels[..., :3]), pixels[..., 3:]], axis=2)
         return self._write(image.name, ".png", png(np.rint(65535.0 * np.clip(pixels, 0.0, 1.0)).astype(">u2")))
 
-    def _luminance(self, image):
-        pixels = self._pixels(image)
+    def _grey(self, image, channel, factor, times_alpha):
+        pixels = self._linear(image, times_alpha)
         if pixels is None:
             return None
-        if not image.is_float and image.colorspace_settings.name == "sRGB":
-            pixels = from_srgb(pixels)
-        grey = np.clip(pixels[..., :3] @ np.array([0.2126, 0.7152, 0.0722], dtype=pixels.dtype), 0.0, 1.0)
-        grey = np.rint(65535.0 * grey).astype(">u2")[..., None]
+        weights = np.array(GREY) * np.array(factor)
+        grey = pixels[..., :3] @ weights if channel is None else pixels[..., "rgba".index(channel)] * weights.sum()
+        grey = np.rint(65535.0 * np.clip(grey, 0.0, 1.0)).astype(">u2")[..., None]
         return self._write(image.name, ".png", png(np.repeat(grey, 3, axis=2)))
+
+    def _normals(self, image, turn):
+        pixels = self._linear(image)
+        if pixels is None:
+            return None
+        pixels[..., :2] = 0.5 + (pixels[..., :2] - 0.5) @ np.array(turn, dtype=np.float32).T
+        return self._write(image.name, ".png", png(np.rint(65535.0 * np.clip(pixels[..., :3], 0.0, 1.0)).astype(">u2")))
 
     def _pixels(self, image):
         """(rows, columns, 4), row 0 at the bottom, or None where there are none."""

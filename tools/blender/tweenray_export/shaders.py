@@ -190,8 +190,8 @@ class Writer:
         value = self.read(fed, name)
         if value.image is not None:
             self.note(f"an image of {name}", "its mean")
-            mean = self.images.mean(value.image.image)
-            return Value(mean).times(value) if value.image.channel is None else Value(value.grey() * mean[0])
+            mean = self.images.mean(value.image.image, value.image.channel, value.image.times_alpha)
+            return Value(mean).times(value)
         if value.colours is not None:
             self.note(f"vertex colours of {name}", "white")
         return Value(value.constant)
@@ -201,7 +201,11 @@ class Writer:
         table = made.table if table is None else table
         value = self.read(fed, name)
         if value.image is not None and value.image.channel is None:
-            file = self.images.colour(value.image.image, value.image.times_alpha)
+            image, times_alpha = value.image.image, value.image.times_alpha
+            if max(value.rgb()) > 1.0 + 1e-6:
+                file, value = self.images.product(image, value.rgb(), times_alpha), Value(1.0, value.image)
+            else:
+                file = self.images.colour(image, times_alpha)
             if file is not None:
                 table[image_key] = self.laid(value.image, file)
         elif value.image is not None:
@@ -209,6 +213,8 @@ class Writer:
             value = self.constant(fed, name)
         if value.colours is not None:
             made.table["vertex_colours"], made.colours = True, value.colours
+            if max(value.rgb()) > 1.0 + 1e-6:
+                self.note(f"a factor above 1 of vertex colours of {name}", "1")
         table[key] = share(value.rgb())
 
     def number(self, table, key, fed, name):
@@ -217,16 +223,17 @@ class Writer:
         if value.image is None:
             table[key] = min(max(value.grey(), 0.0), 1.0)
             return
-        image, channel = value.image.image, value.image.channel
-        if channel is None and not self.images.is_grey(image):
-            file, channel = self.images.luminance(image), "g"
+        image, channel, factor = value.image.image, value.image.channel, value.grey()
+        is_coloured = channel is None and not self.images.is_grey(image)
+        times_alpha = value.image.times_alpha and self.images.is_transparent(image)
+        if is_coloured or times_alpha or factor > 1.0 + 1e-6:
+            file, channel, factor = self.images.grey(image, channel, value.rgb(), times_alpha), "g", 1.0
         else:
             file = self.images.data(image)
         if file is None:
             table[key] = 0.0
             return
         table[key] = self.laid(value.image, file, True) | {"channel": channel or "g"}
-        factor = value.grey()
         if not math.isclose(factor, 1.0, rel_tol=1e-6):
             table[key]["factor"] = min(max(factor, 0.0), 1.0)
 
@@ -248,9 +255,14 @@ class Writer:
         if colour is None or colour.image is None or node.node.space != "TANGENT":
             self.note(f"normals from {node.node.name} ({node.kind})", "the surface's own")
             return
-        file = self.images.data(colour.image.image)
+        turn = turned_back(colour.image.table)
+        file = self.images.data(colour.image.image) if turn is None else self.images.normals(colour.image.image, turn)
         if file is None:
             return
+        if turn is not None and 1e-6 < abs(turn[0][0]) < 1.0 - 1e-6:
+            self.note("a normal map that is turned by other than right angles", "right where its UV map keeps angles")
+        if colour.image.table.get("wrap") == "mirror":
+            self.note("a normal map that is mirrored at its edges", "its normals are mirrored, too")
         laid = self.laid(colour.image, file, True)
         strength = self.constant(node, "Strength").grey()
         if strength != 1.0:
@@ -275,7 +287,7 @@ class Writer:
                 made.table["emission_texture"] = self.laid(value.image, file)
 
     def cut(self, made, value):
-        """Cut-outs by an image's alpha, or its grey."""
+        """Cut-outs by an image's alpha, one of its channels, or its grey."""
         if "glass" in made.table:
             self.note("alpha on glass", "none")
             return
@@ -283,11 +295,14 @@ class Writer:
             self.note("alpha that is less than a half everywhere", "nothing")
             made.is_seen = False
             return
-        if not math.isclose(value.grey(), 1.0, rel_tol=1e-6):
-            self.note("a factor of an image's alpha", "1")
-        if value.image.channel in ("r", "g", "b"):
-            self.note("one channel of an image as alpha", "all of the image's")
-        file = self.images.alpha(value.image.image)
+        image, channel = value.image.image, value.image.channel
+        if channel == "a" and math.isclose(value.grey(), 1.0, rel_tol=1e-6):
+            # Scene files cut by the colours of an image that is opaque all over.
+            if self.images.is_opaque(image):
+                return
+            file = self.images.alpha(image)
+        else:
+            file = self.images.grey(image, channel, value.rgb(), value.image.times_alpha)
         if file is not None:
             self.note("partial transparency", "cut-outs: a surface is there where alpha is a half or more")
             made.table["alpha"] = self.laid(value.image, file)
@@ -296,6 +311,16 @@ class Writer:
 def share(rgb):
     """Reflectances between 0 and 1."""
     return [min(max(float(c), 0.0), 1.0) for c in rgb]
+
+
+def turned_back(laid):
+    """The matrix that turns the parts of normals along u and v into the axes of an image that lies as `laid` says; None where it is the
+    identity. Normals follow an image in tweenray, in Blender its UV map."""
+    turn, (wide, high) = math.radians(laid.get("rotate", 0.0)), laid.get("scale", (1.0, 1.0))
+    along = math.atan2(-math.sin(turn) / high, math.cos(turn) / wide)
+    c, s, side = math.cos(along), math.sin(along), math.copysign(1.0, wide * high)
+    matrix = [[round(x, 9) + 0.0 for x in row] for row in ((c, s), (-side * s, side * c))]
+    return None if matrix == [[1.0, 0.0], [0.0, 1.0]] else matrix
 
 
 def three(x):

@@ -3,9 +3,8 @@ vertex colours."""
 
 import math
 
+from .images import DATA, GREY
 from .nodes import Place
-
-GREY = (0.2126, 0.7152, 0.0722)
 
 
 class Value:
@@ -53,7 +52,9 @@ class Reader:
         if fed is None:
             return Value(place.default())
         found = self.of_node(fed)
-        if found is not None:
+        # Scene files have vertex colours of colours alone.
+        is_number = place.socket.type == "VALUE"
+        if found is not None and not (is_number and found.colours is not None):
             return found
         self.report.add(self.name, f"{what} from the node {fed.node.name} ({fed.kind})", "the socket's own value")
         return Value(place.socket.default_value if not hasattr(place.socket.default_value, "__len__")
@@ -140,10 +141,14 @@ class Reader:
             self.report.add(self.name, f"the tiles of the image {node.image.name}", "its first tile everywhere")
         if node.projection != "FLAT":
             self.report.add(self.name, f"the projection {node.projection} of an image", "texture coordinates")
+        if node.interpolation != "Linear":
+            self.report.add(self.name, f"the interpolation {node.interpolation} of an image", "linear")
+        if is_moved(node.texture_mapping):
+            self.report.add(self.name, f"the texture mapping of {node.name} itself", "none")
         uv_map, steps = self.mapping(fed.input("Vector"))
         table |= steps
         # Cycles multiplies colours by alpha unless a node takes the alpha too.
-        times_alpha = channel is None and not node.outputs["Alpha"].is_linked and node.image.alpha_mode in ("STRAIGHT", "PREMUL")
+        times_alpha = channel != "a" and not node.outputs["Alpha"].is_linked and has_alpha(node.image)
         return Laid(node.image, channel, table, uv_map, times_alpha)
 
     def mapping(self, place):
@@ -158,7 +163,7 @@ class Reader:
             return None, {}
         if fed.kind == "ATTRIBUTE" and node.attribute_type == "GEOMETRY":
             return node.attribute_name or None, {}
-        if fed.kind == "MAPPING" and node.vector_type in ("POINT", "VECTOR"):
+        if fed.kind == "MAPPING" and node.vector_type in ("POINT", "VECTOR") and fed.input("Vector").fed() is not None:
             uv_map, inner = self.mapping(fed.input("Vector"))
             values = {name: self.of_place(fed.input(name)) for name in ("Rotation", "Scale")}
             values["Location"] = Value([0.0] * 3)
@@ -182,3 +187,15 @@ class Reader:
         if move[0] != 0.0 or move[1] != 0.0:
             keys["offset"] = [move[0], move[1]]
         return keys
+
+
+def has_alpha(image):
+    """Whether Cycles multiplies an image's colours by its alpha where no node takes that."""
+    return image.alpha_mode in ("STRAIGHT", "PREMUL") and image.colorspace_settings.name not in DATA
+
+
+def is_moved(mapping):
+    """Whether an image node's own mapping, which older files have, moves the image."""
+    axes = (mapping.mapping_x, mapping.mapping_y, mapping.mapping_z)
+    numbers = (*mapping.translation, *mapping.rotation, *(s - 1.0 for s in mapping.scale))
+    return any(numbers) or axes != ("X", "Y", "Z") or mapping.use_min or mapping.use_max

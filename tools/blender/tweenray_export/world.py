@@ -9,7 +9,7 @@ import numpy as np
 
 from .nodes import Place
 from .report import is_animated
-from .values import Reader
+from .values import Reader, has_alpha
 
 # Size of the image that a world of other nodes is rendered to, and samples a pixel.
 SIZE, SAMPLES = (2048, 1024), 32
@@ -61,7 +61,7 @@ class World:
         turn = self.turn(source.input("Vector"), reader)
         if turn is None or source.node.projection != "EQUIRECTANGULAR":
             return False
-        file = self.images.colour(source.node.image)
+        file = self.images.colour(source.node.image, has_alpha(source.node.image))
         # The middle of Blender's image is seen along +x, of tweenray's along -z.
         table = {"image": file, "rotate": (-90.0 - turn) % 360.0}
         return None if file is None else table | ({} if factor == 1.0 else {"strength": factor})
