@@ -4,6 +4,7 @@ import math
 import os
 
 import bpy
+import numpy as np
 
 from common import FOLDER, Case, export, seen_at
 
@@ -69,3 +70,42 @@ class Cameras(Case):
         with self.assertRaisesRegex(ValueError, "no camera"):
             export("none")
         self.assertEqual(scene.render.engine, "CYCLES")
+
+    def test_a_camera_far_from_the_origin_looks_where_blenders_looks(self):
+        scene = stage.fresh(frames=3)
+        camera = scene.camera
+        camera.location = (3e6, -4e6, 2e6)
+        turn = (math.radians(80.0), 0.0)
+        for frame in (1, 2, 3):
+            camera.rotation_euler = (*turn, 1e-4 * frame)
+            camera.keyframe_insert("location", frame=frame)
+            camera.keyframe_insert("rotation_euler", frame=frame)
+        found = export("far")[0]["camera"]
+        for frame, key in enumerate(found["keys"], 1):
+            eye, target = (np.array(key[name]) for name in ("eye", "target"))
+            high, around = turn[0], 1e-4 * frame
+            forward = [-math.sin(around) * math.sin(high), -math.cos(high), -math.cos(around) * math.sin(high)]
+            self.near((target - eye) / np.linalg.norm(target - eye), forward, 3e-7)
+
+    def test_a_camera_that_its_parent_shears_is_noted(self):
+        scene = stage.fresh()
+        parent = stage.place("parent", None, turn=(0.0, 0.0, 20.0), scale=(1.0, 1.0, 1.0))
+        scene.camera.parent = parent
+        self.assertEqual(export("unsheared")[1], [])
+        parent.scale = (1.0, 2.0, 1.0)
+        self.noted(export("sheared")[1], "Camera", "sheared")
+
+    def test_cameras_of_markers_share_their_blades_and_need_no_active_camera(self):
+        scene = stage.fresh(frames=4)
+        other = stage.place("other", bpy.data.cameras.new("other"), (5.0, 0.0, 1.0))
+        for frame, camera in ((1, scene.camera), (3, other)):
+            scene.timeline_markers.new(camera.name, frame=frame).camera = camera
+            camera.data.dof.use_dof, camera.data.dof.aperture_blades = True, 5
+        scene.camera = None
+        found, lines, _ = export("markers")
+        self.near([key["eye"] for key in found["camera"]["keys"]], [[0.0, 3.0, 8.0]] * 2 + [[5.0, 1.0, 0.0]] * 2)
+        self.assertEqual(lines, [])
+        other.data.dof.aperture_blades = 7
+        found, lines, _ = export("markers")
+        self.assertEqual(found["camera"]["lens"]["blades"], 5)
+        self.noted(lines, "Scene", "blades", "differ")

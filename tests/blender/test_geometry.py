@@ -6,7 +6,7 @@ import os
 import bpy
 import numpy as np
 
-from common import FOLDER, Case, export, meshes, ply
+from common import FOLDER, Case, export, exporter, meshes, ply
 
 import stage
 
@@ -85,6 +85,58 @@ class Geometry(Case):
         self.noted(lines, "two", "moves or changes during the shot")
         self.assertEqual(scene.frame_current, 2)
 
+    def test_movements_that_come_home_are_noted(self):
+        scene = stage.fresh(frames=101)
+        shaken = stage.place("shaken", stage.cube())
+        # At home in the first, the middle and the last frame.
+        for frame in range(1, 102, 25):
+            shaken.location.x = (frame - 1) // 25 % 2
+            shaken.keyframe_insert("location", frame=frame)
+        stage.place("still", stage.cube())
+        self.noted(export("shaken")[1], "shaken", "moves or changes")
+        for cost in (1, 10**6):
+            frames = exporter.compared_frames(101, cost)
+            self.assertTrue({50, 100} <= frames <= set(range(1, 101)))
+        self.assertLess(len(frames), 10)
+        self.noted(self.with_budget(1), "shaken", "moves or changes")
+
+    def with_budget(self, most):
+        """The report where no more than `most` instances are looked at, and in few frames."""
+        kept, exporter.MOST_COMPARED = exporter.MOST_COMPARED, most
+        try:
+            return export("budget")[1]
+        finally:
+            exporter.MOST_COMPARED = kept
+
+    def test_forms_that_change_inside_their_box_are_noted(self):
+        scene = stage.fresh(frames=3)
+        ball = stage.place("ball", stage.ball(segments=16))
+        ball.shape_key_add(name="Basis")
+        dent = ball.shape_key_add(name="dent")
+        dent.data[20].co *= 0.5
+        scroll = stage.place("scroll", stage.plane("scroll")).modifiers.new("scroll", "UV_WARP")
+        for frame in (1, 3):
+            dent.value, scroll.offset = 0.5 * (frame - 1), (frame, 0.0)
+            dent.keyframe_insert("value", frame=frame)
+            scroll.keyframe_insert("offset", frame=frame)
+        stage.place("still", stage.ball("still", segments=16))
+        lines = export("bent")[1]
+        for name in ("ball", "scroll"):
+            self.noted(lines, f"{name}: it moves or changes")
+        self.assertEqual(len(lines), 2)
+
+    def test_animation_in_a_group_of_a_group_is_noted(self):
+        stage.fresh(frames=3)
+        inner, outer = (bpy.data.node_groups.new(name, "ShaderNodeTree") for name in ("inner", "outer"))
+        outer.nodes.new("ShaderNodeGroup").node_tree = inner
+        value = inner.nodes.new("ShaderNodeValue")
+        material = stage.diffuse("grouped", (1.0, 1.0, 1.0))
+        material.node_tree.nodes.new("ShaderNodeGroup").node_tree = outer
+        stage.place("block", stage.cube(material=material))
+        self.assertEqual(export("groups")[1], [])
+        value.outputs[0].keyframe_insert("default_value", frame=1)
+        self.noted(export("groups")[1], "grouped", "it is animated")
+
     def test_text_and_curves_are_meshes_and_other_kinds_are_noted(self):
         stage.fresh()
         curve = bpy.data.curves.new("letter", "FONT")
@@ -136,6 +188,19 @@ class AddOn(Case):
         self.assertEqual(done, {"FINISHED"})
         with open(os.path.join(folder, "report.txt"), encoding="utf-8") as file:
             self.assertIn("p: sheen: none", file.read())
+
+    def test_the_operator_reports_what_blender_refuses(self):
+        import tweenray_export
+
+        scene = stage.fresh(4, 4)
+        scene.render.resolution_percentage = 1
+        tweenray_export.register()
+        try:
+            with self.assertRaises(RuntimeError) as raised:
+                bpy.ops.export_scene.tweenray(filepath=os.path.join(FOLDER, "refused", "scene.toml"))
+        finally:
+            tweenray_export.unregister()
+        self.assertNotIn("Traceback", str(raised.exception))
 
     def test_text_and_curves_are_placed_once(self):
         scene = stage.fresh()
@@ -209,6 +274,8 @@ class AddOn(Case):
         stage.place("floor", stage.plane())
         found, lines, _ = export("settings")
         self.assertEqual(found["settings"]["size"], [29, 87])
+        scene.sequence_editor_create().strips.new_effect("colour", "COLOR", 1, 1, length=10)
+        self.noted(export("strips")[1], "strips of the video sequencer")
         for words in (("transparent film",), ("Freestyle",), ("surface to surface",), ("invisible to the camera",), ("clip start 8",), ("clip end 9",), ("material override",), ("cut out", "holdout")):
             self.noted(lines, *words)
         self.assertTrue(render.use_freestyle)

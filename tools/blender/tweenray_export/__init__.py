@@ -34,7 +34,7 @@ class ExportTweenray(bpy.types.Operator, ExportHelper):
         folder = os.path.dirname(bpy.path.abspath(self.filepath))
         try:
             lines = scene_export.write(context.scene, folder)
-        except (ValueError, OSError) as error:
+        except (ValueError, OSError, RuntimeError) as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         for line in lines:

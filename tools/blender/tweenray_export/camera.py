@@ -13,6 +13,8 @@ from . import axes
 
 # A camera's own clip start, nearer than which nothing is that a picture should show.
 USUAL_START = 0.11
+# Cosine between two axes of a camera beyond which it is sheared; rounding alone gives some 1e-7.
+MOST_SHEAR = 1e-4
 
 
 def record(camera, depsgraph, size, report):
@@ -32,12 +34,16 @@ def record(camera, depsgraph, size, report):
     up, forward = place.col[1].xyz, -place.col[2].xyz
     if right.cross(up).dot(-forward) < 0.0:
         report.add(name, "the camera is mirrored by its scale", "it is not mirrored")
+    if max(abs(right.dot(up)), abs(up.dot(forward)), abs(forward.dot(right))) > MOST_SHEAR:
+        report.add(name, "the camera is sheared by the scale of its parent", "its axes are at right angles")
     lens = thin_lens(data, eye, forward, depsgraph, report, name)
-    reach = lens["focus"] if lens else 10.0
+    # Nine digits of the target keep the direction to 1e-8 where it is about as far away as the origin.
+    reach = max(lens["focus"] if lens else 10.0, eye.length)
     half_width, half_height = 1.0 / projection[0][0], 1.0 / projection[1][1]
     return {
         "eye": axes.vector(eye),
-        "target": axes.vector(eye + forward * reach),
+        # In f64: f32 would round the target to half a unit at 5e6 units from the origin.
+        "target": axes.vector([e + f * reach for e, f in zip(eye, forward)]),
         "up": axes.vector(up),
         "fov": 2.0 * math.degrees(math.atan(half_height)),
         "shift": [0.5 * projection[0][2], 0.5 * projection[1][2]],
@@ -84,6 +90,14 @@ def thin_lens(data, eye, forward, depsgraph, report, name):
         turn = math.degrees(dof.aperture_rotation) + 180.0 / blades - 90.0
         lens |= {"blades": blades, "blade_rotation": turn % (360.0 / blades)}
     return lens
+
+
+def note_blades(records, name, report):
+    """Notes apertures that change their blades during the shot of the scene `name`; tweenray has one shape for all frames."""
+    lenses = [record["lens"] for record in records if record["lens"]]
+    shapes = [(lens.get("blades", 0), lens.get("blade_rotation", 0.0)) for lens in lenses if lens["radius"] > 0.0]
+    if any(a[0] != b[0] or abs(a[1] - b[1]) > 1e-3 for a, b in zip(shapes, shapes[1:])):
+        report.add(name, "the blades of the aperture or their rotation differ between frames", "those of the first frame with depth of field")
 
 
 def table(records):

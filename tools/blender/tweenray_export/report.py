@@ -26,6 +26,12 @@ class Report:
 
 
 def is_animated(block):
-    """Whether values of a data-block change with time."""
-    data = block and block.animation_data
-    return bool(data and (data.action or data.drivers or data.nla_tracks))
+    """Whether values of a data-block, or of the node groups in it, change with time."""
+    blocks = [block] if block else []
+    for found in blocks:
+        data = found.animation_data
+        if data and (data.action or data.drivers or data.nla_tracks):
+            return True
+        groups = [getattr(node, "node_tree", None) for node in getattr(found, "nodes", ())]
+        blocks.extend(group for group in groups if group and group not in blocks)
+    return False

@@ -8,11 +8,12 @@ import math
 import os
 
 import bpy
+import numpy as np
 
 from . import axes, camera, lights, toml
 from .images import Images
 from .materials import DEFAULT, Materials
-from .meshes import Meshes, free_name
+from .meshes import Meshes, floats, free_name
 from .report import Report, is_animated
 from .world import World
 
@@ -20,6 +21,9 @@ from .world import World
 SILENT = {"EMPTY", "CAMERA", "ARMATURE", "LATTICE", "SPEAKER", "LIGHT_PROBE", "LIGHT"}
 SURFACES = {"MESH", "CURVE", "SURFACE", "META", "FONT"}
 MOST_BYTES = 16 << 20
+# To find what moves: instances (or thousands of points of meshes) that are looked at in all frames together, frames that are
+# looked at however large the scene is, and points of a mesh.
+MOST_COMPARED, FEWEST_FRAMES, MOST_POINTS = 100_000, 6, 10_000
 
 
 class Engine(bpy.types.RenderEngine):
@@ -47,7 +51,7 @@ def write(scene, folder):
 
     Raises ValueError for what cannot be exported, OSError for what cannot be written.
     """
-    if scene.camera is None:
+    if scene.camera is None and not any(marker.camera for marker in scene.timeline_markers):
         raise ValueError(f"{scene.name}: no camera; add one and make it active (Ctrl-0)")
     if not hasattr(scene, "cycles"):
         raise ValueError(f"{scene.name}: the add-on Cycles is off; switch it on in Edit, Preferences, Add-ons")
@@ -112,8 +116,10 @@ class Export:
                 self.clipping = camera.Clipping(scene.camera.evaluated_get(depsgraph), self.report)
                 self.geometry(depsgraph)
                 before = places(depsgraph)
-            if frame in (frames[len(frames) // 2], frames[-1]) and frame != frames[0]:
+                compared = {frames[i] for i in compared_frames(len(frames), cost(before))}
+            elif frame in compared:
                 self.note_moves(before, places(depsgraph), frames[0])
+        camera.note_blades(self.records, scene.name, self.report)
 
     def camera(self, depsgraph):
         ob = depsgraph.scene.camera
@@ -125,11 +131,18 @@ class Export:
     def note_moves(self, before, now, frame):
         for key in (key for key in before if key not in now):
             self.report.add(key[0], "it disappears during the shot", f"it stays as at frame {frame}")
-        for key, matrix in now.items():
+        bent = {}
+        for key in now:
             name = key[0]
             if key not in before:
                 self.report.add(name, "it appears during the shot", f"it is absent, as at frame {frame}")
-            elif any(abs(a - b) > 1e-5 * max(1.0, abs(a)) for a, b in zip(before[key], matrix)):
+                continue
+            (place, form), (new_place, new_form) = before[key], now[key]
+            # Many objects share a form, which is compared once.
+            pair = id(form), id(new_form)
+            if pair not in bent:
+                bent[pair] = differ(form, new_form)
+            if bent[pair] or differ(place, new_place):
                 self.report.add(name, "it moves or changes during the shot", f"it stays as at frame {frame}")
 
     def note_settings(self):
@@ -142,6 +155,8 @@ class Export:
         nodes = getattr(scene, "compositing_node_group", None) or (scene.use_nodes and getattr(scene, "node_tree", None))
         if render.use_compositing and nodes:
             self.report.add(scene.name, "compositing", "none")
+        if render.use_sequencer and any(strip.type != "SOUND" and not strip.mute for strip in strips(scene)):
+            self.report.add(scene.name, "strips of the video sequencer", "the picture of the scene's camera")
         if render.use_freestyle:
             self.report.add(scene.name, "Freestyle", "no lines")
         if render.use_multiview:
@@ -301,6 +316,13 @@ def camera_text(records):
     return text
 
 
+def strips(scene):
+    """The strips of the scene's video sequencer."""
+    editor = scene.sequence_editor
+    # They are `sequences` before Blender 4.4.
+    return getattr(editor, "strips", None) or getattr(editor, "sequences", []) if editor else []
+
+
 def size(scene):
     """(width, height) of the picture, pixels."""
     render = scene.render
@@ -313,20 +335,64 @@ def is_mesh_of_another(ob):
     return ob.type == "MESH" and ob.original.type != "MESH"
 
 
+def compared_frames(count, cost):
+    """The numbers, from 1 to `count` - 1, of the frames that are compared with frame 0, of which each costs `cost`: all, or
+    the middle, the last and a few at irregular places, which no period of a movement fits."""
+    most = max(MOST_COMPARED // cost, FEWEST_FRAMES)
+    if count - 1 <= most:
+        return set(range(1, count))
+    golden = 0.5 * (math.sqrt(5.0) - 1.0)
+    return {count // 2, count - 1} | {1 + int((k * golden % 1.0) * (count - 1)) for k in range(1, most - 1)}
+
+
+def cost(found):
+    """What `places` costs: instances, and points of the different forms by the thousand."""
+    forms = {id(form): form for _, form in found.values()}
+    return 1 + len(found) + int(sum(form[0] for form in forms.values())) // 1000
+
+
 def places(depsgraph):
-    """{(name, which of its instances): numbers of its placement and form} of what is seen."""
-    found = {}
+    """{(name, which of its instances): (numbers of its placement, points of its form)} of what is seen."""
+    found, forms = {}, {}
     for instance in depsgraph.object_instances:
         ob = instance.object
         if instance.show_self and ob.type in SURFACES | {"LIGHT"}:
             parent = instance.parent.name if instance.parent else ""
-            found[ob.name, ob.type, parent, tuple(instance.persistent_id)] = numbers(ob, instance.matrix_world)
+            key = ob.data.as_pointer()
+            if key not in forms:
+                forms[key] = form(ob)
+            place = [x for row in instance.matrix_world for x in row]
+            found[ob.name, ob.type, parent, tuple(instance.persistent_id)] = place, forms[key]
     return found
 
 
-def numbers(ob, matrix):
-    """What changes where an object moves, or is bent, or where a light gets brighter."""
-    found = [x for row in matrix for x in row]
+def form(ob):
+    """What changes where an object is bent, or where a light gets brighter, after how many points and corners it has:
+    of a mesh its box, evenly chosen points and their texture coordinates."""
     if ob.type == "LIGHT":
-        return found + [ob.data.energy, *ob.data.color]
-    return found + [x for corner in ob.bound_box for x in corner]
+        return np.array([0, ob.data.energy, *ob.data.color])
+    box = np.array(ob.bound_box).reshape(-1)
+    if ob.type != "MESH":
+        return np.array([0, *box])
+    mesh = ob.data
+    points = floats(mesh.vertices, "co", len(mesh.vertices), 3)
+    parts = [[len(points) + len(mesh.loops)], box, chosen(points)]
+    layer = next((layer for layer in mesh.uv_layers if layer.active_render), None)
+    if layer is not None:
+        parts.append(chosen(floats(layer.uv, "vector", len(layer.uv), 2)))
+    return np.concatenate(parts)
+
+
+def chosen(rows):
+    """The numbers of at most `MOST_POINTS` rows at even distances."""
+    return rows[:: 1 + len(rows) // MOST_POINTS].reshape(-1)
+
+
+def differ(before, now):
+    """Whether numbers differ by more than rounding."""
+    if isinstance(before, list):
+        return before != now and any(abs(a - b) > 1e-5 * max(1.0, abs(a)) for a, b in zip(before, now))
+    if before.shape != now.shape:
+        return True
+    with np.errstate(invalid="ignore"):
+        return bool((np.abs(before - now) > 1e-5 * np.maximum(1.0, np.abs(before))).any())
