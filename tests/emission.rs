@@ -6,7 +6,7 @@ mod common;
 
 use common::{Job, job, mean, pose, render, render_scene};
 use tweenray::film::Film;
-use tweenray::math::{DVec3, Rgb, Vec2};
+use tweenray::math::{DAffine2, DVec2, DVec3, Rgb, Vec2};
 use tweenray::scene::{
     AlphaMask, Corners, IntersectorKind, Light, Material, SphereLight, Texture, TextureMap, World,
     WorldMesh, Wrap,
@@ -309,6 +309,43 @@ fn cut_outs_that_emit_light_as_black_texels_do() {
         let of_black = worst(&job, picture, 0.6);
         println!("worst error by holes {of_holes:.4}, by black texels {of_black:.4}");
         assert!(of_holes < 0.02 && of_black < 0.02);
+    }
+}
+
+/// A pattern that repeats many times lights as much of the floor as there is of it.
+#[test]
+fn repeated_cut_outs_light_by_what_is_there() {
+    type Pattern = fn(u32, u32) -> bool;
+    let patterns: [(&str, u32, Pattern); 3] = [
+        ("dots", 256, |x, y| (x % 16).abs_diff(8).pow(2) + (y % 16).abs_diff(8).pow(2) < 30),
+        ("fence", 256, |x, y| x % 32 < 2 || y % 32 < 2),
+        ("checks", 64, |x, y| (x + y) % 2 == 1),
+    ];
+    let lit = |alpha: Option<(AlphaMask, f64)>| {
+        let mut world = lit_floor(|_, _| 3.0, 0.6, 1);
+        let panel = &mut world.materials[1];
+        panel.emission_map = None;
+        if let Some((mask, scale)) = alpha {
+            let transform = DAffine2::from_scale(DVec2::splat(scale));
+            panel.alpha = Some(TextureMap { transform, ..TextureMap::of(0) });
+            world.masks.push(mask);
+        }
+        let mut job = job(world, pose((3.0, 1.0, 0.0), (1.2, 0.0, 0.0)), 12, 9);
+        job.settings.shadow_samples = 16;
+        mean(&render(&job).0)
+    };
+    let whole = lit(None);
+    for (name, n, is_there) in patterns {
+        let texels: Vec<u8> =
+            (0..n * n).map(|i| if is_there(i % n, i / n) { 255 } else { 0 }).collect();
+        let share = texels.iter().filter(|texel| **texel > 0).count() as f64 / texels.len() as f64;
+        for scale in [3.0, 8.0, 50.0] {
+            let mask = AlphaMask { name: name.into(), width: n, height: n, texels: texels.clone() };
+            let found = lit(Some((mask, scale))) / whole;
+            println!("{name}, {scale} times: {found:.4} of the light, {share:.4} is there");
+            // Between texels of which one is there the edge lies in the middle, but at corners.
+            assert!((found - share).abs() < 0.02 + 0.05 * share, "{name} {scale}");
+        }
     }
 }
 

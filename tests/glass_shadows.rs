@@ -9,7 +9,8 @@ use std::f64::consts::PI;
 use tweenray::math::{Bounds3, DVec3, Rgb};
 use tweenray::scene::{
     Camera, DirectionalLight, Environment, EnvironmentKind, Fog, Glass, GlassShadows,
-    IntersectorKind, Light, Material, QuadLight, Settings, SkyGradient, World,
+    IntersectorKind, Light, Material, PointLight, QuadLight, Settings, SkyGradient, World,
+    WorldSphere,
 };
 use tweenray::shade::optics;
 use tweenray::stats::RayKind;
@@ -93,6 +94,52 @@ fn panes_and_bodies_take_fresnel_tint_and_absorption() {
         let expected = open * TINT * TINT * faces * (absorption * (-1.0 / cos) as f32).exp();
         println!("cosine {cos}, slab: {found} for {expected}");
         close(found, expected, 1e-4);
+    }
+}
+
+/// Light of a lamp in a body is absorbed on its way out.
+#[test]
+fn a_lamp_inside_of_a_body_lights_through_it() {
+    let absorption = Rgb::new(0.1, 1.0, 3.0);
+    let lit = |absorption| {
+        let mut world = world(None);
+        let material = glass(Glass { absorption, ..Glass::clear(1.5) });
+        let material = world.add_material(material);
+        let (centre, radius) = (DVec3::new(0.0, 2.0, 0.0), 1.0);
+        let name = "body".to_owned();
+        world.spheres.push(WorldSphere { name, centre, radius, material, always_traced: false });
+        let lamp = PointLight { position: centre, intensity: Rgb::splat(4.0) };
+        world.lights.push(Light::Point(lamp));
+        render(&job(world)).0.rgb[0]
+    };
+    let (clear, amber) = (lit(Rgb::ZERO), lit(absorption));
+    println!("a lamp in a body: {} of {clear}", amber / clear);
+    close(amber, clear * (-absorption).exp(), 1e-4);
+}
+
+/// A lobe cannot find lights without a surface, so that their own rays go through glass.
+#[test]
+fn highlights_of_lights_without_a_surface_go_through() {
+    let position = DVec3::new(-2.0, 5.0, 0.3);
+    let point = Light::Point(PointLight { position, intensity: Rgb::splat(30.0) });
+    // Many of them are drawn by samples.
+    let many = vec![Light::Point(PointLight { position, intensity: Rgb::splat(1.0) }); 30];
+    for lights in [vec![point], vec![sun(0.8)], many] {
+        let lit = |above: Option<(Material, bool)>| {
+            let mut world = world(above);
+            world.materials[0].diffuse = Rgb::ZERO;
+            world.materials[0].mirror = Rgb::ONE;
+            world.materials[0].roughness = 0.7;
+            world.lights = lights.clone();
+            render(&job(world)).0.rgb[0]
+        };
+        // It reflects nothing, so that no light goes to and fro.
+        let pane = glass(Glass { tint: TINT, thin: true, ..Glass::clear(1.0) });
+        let (open, behind) = (lit(None), lit(Some((pane, false))));
+        let share = behind / open;
+        println!("a highlight behind a pane: {share}");
+        assert!(open.x > 0.0);
+        close(share, TINT, 1e-4);
     }
 }
 

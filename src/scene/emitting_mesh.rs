@@ -180,7 +180,8 @@ impl<'m> Emission<'m> {
         self.colour * mean_between(image, map, corners)
     }
 
-    /// The mean radiance of a part of face `at` of what has holes: of points in rows.
+    /// The mean radiance of a part of face `at` of what has holes: of points in rows, each anywhere between its neighbours, since
+    /// even rows would meet a pattern that repeats always at the same places.
     fn mean_there(&self, at: usize, part: Part, mask: &LaidMask<'_>) -> Rgb {
         let triangle = self.mesh.triangles[at];
         let corners_of = |uvs: Option<&Corners<Vec2>>| {
@@ -211,10 +212,12 @@ impl<'m> Emission<'m> {
         let wanted = 2.0 * (share * on_mask.max(on_image)).sqrt();
         // NaN counts as few.
         let rows = wanted.max(4.0).min(f64::from(most)) as u32;
+        // Another stretch of the sequence in each part: a pattern may repeat from part to part.
+        let start = at + (1e4 * (part[0].0 + 0.618 * part[0].1)) as usize;
         let mut sum = DVec3::ZERO;
-        for smaller in parts(rows) {
-            let middle = within(part, smaller).map(DVec2::from).iter().sum::<DVec2>() / 3.0;
-            let place = middle.into();
+        for (k, smaller) in parts(rows).enumerate() {
+            let corners = within(part, smaller).map(DVec2::from);
+            let place = between(corners, inner_point((start + k) as f64)).into();
             if of_mask.is_none_or(|uvs| mask.is_there(between(uvs, place).as_vec2())) {
                 sum += match &image {
                     Some((level, map, corners)) => {
@@ -388,6 +391,14 @@ fn parts(rows: u32) -> impl Iterator<Item = Part> {
 fn within(outer: Part, inner: Part) -> Part {
     let [a, b, c] = outer.map(|(u, v)| DVec2::new(u, v));
     inner.map(|(u, v)| (a + (b - a) * u + (c - a) * v).into())
+}
+
+/// Weights of the second and third corner of a triangle at point number `k` of a sequence that fills it evenly (Roberts, 2018).
+fn inner_point(k: f64) -> (f64, f64) {
+    const PLASTIC: f64 = 1.324_717_957_244_746;
+    let k = k + 1.0;
+    let (u, v) = ((k / PLASTIC).fract(), (k / (PLASTIC * PLASTIC)).fract());
+    if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) }
 }
 
 /// The mean of what `image` shows between three `corners`, in its coordinates.

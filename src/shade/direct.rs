@@ -113,6 +113,8 @@ pub(super) struct ShadowScratch {
     pub users: LightUsers,
     /// Samples of the tail.
     pub tail: TailSamples,
+    /// Rays to lights without a surface.
+    pub unseen: Vec<usize>,
     /// Samples of an environment.
     pub environment: EnvironmentScratch,
     /// Samples in fog.
@@ -702,7 +704,12 @@ impl Renderer<'_> {
     }
 
     /// Traces the batch's rays, to a light that may lie behind glass.
-    fn trace_light(&self, source: &LightSource, s: &mut ShadowScratch, counts: &mut RayCounts) {
+    pub(super) fn trace_light(
+        &self,
+        source: &LightSource,
+        s: &mut ShadowScratch,
+        counts: &mut RayCounts,
+    ) {
         counts[source.rays] += s.rays.len() as u64;
         self.trace_through(s, counts);
     }
@@ -710,22 +717,26 @@ impl Renderer<'_> {
     /// Traces the batch's rays, which are counted already, straight through glass where the scene wants that.
     pub(super) fn trace_through(&self, s: &mut ShadowScratch, counts: &mut RayCounts) {
         self.trace_rays(s, counts);
-        if !self.plan.glass_shadows {
+        if self.plan.glass_shadows {
+            (0..s.rays.len()).for_each(|k| self.follow(k, s, counts));
+        }
+    }
+
+    /// Follows the batch's ray number `k`, if it is occluded, straight through glass.
+    pub(super) fn follow(&self, k: usize, s: &mut ShadowScratch, counts: &mut RayCounts) {
+        if !s.occluded[k] {
             return;
         }
-        let ShadowScratch { rays, seen, occluded, tints, .. } = s;
-        for (k, occluded) in occluded.iter_mut().enumerate().filter(|(_, occluded)| **occluded) {
-            let left = self.through_glass(&rays[k], counts);
-            if left == Rgb::ZERO {
-                continue;
-            }
-            *occluded = false;
-            match seen.get_mut(k) {
-                Some(seen) => *seen *= left,
-                None => {
-                    tints.resize(rays.len(), Rgb::ONE);
-                    tints[k] = left;
-                }
+        let left = self.through_glass(&s.rays[k], counts);
+        if left == Rgb::ZERO {
+            return;
+        }
+        s.occluded[k] = false;
+        match s.seen.get_mut(k) {
+            Some(seen) => *seen *= left,
+            None => {
+                s.tints.resize(s.rays.len(), Rgb::ONE);
+                s.tints[k] = left;
             }
         }
     }

@@ -145,7 +145,12 @@ impl Renderer<'_> {
                     self.highlight_rays(source, point, n as f64, &mut u, draw, s);
                     s.close();
                 }
-                self.trace_shadow_rays(source, s, counts);
+                // What lies behind glass, the lobe's rays see.
+                if source.sampler.is_seen() {
+                    self.trace_shadow_rays(source, s, counts);
+                } else {
+                    self.trace_light(source, s, counts);
+                }
                 for (point, seen) in group().zip(s.highlights()) {
                     let light = point.throughput * source.sampler.emission * seen;
                     pixels.add(point.place.pixel, point.place.sample, light);
@@ -193,6 +198,7 @@ impl Renderer<'_> {
         counts: &mut RayCounts,
     ) {
         let mut samples = std::mem::take(&mut s.tail);
+        let mut unseen = std::mem::take(&mut s.unseen);
         for (point, cell) in points.iter().zip(cells) {
             let tail = selection.of_glossy(*cell).tail();
             if tail.is_empty() {
@@ -200,18 +206,24 @@ impl Renderer<'_> {
             }
             self.draw_tail(&point.place, (&tail, selection), pixels, &mut samples);
             s.clear();
+            unseen.clear();
             for Choice { source, count, place } in samples.choices(tail, selection) {
                 let Some(source) = source.map(|at| &input.lights[at]) else { continue };
                 let before = s.ray_count();
                 self.highlight_rays(source, point, count, &mut [place], |_| (), s);
                 s.tint_from(before, source.sampler.emission);
                 counts[source.rays] += (s.ray_count() - before) as u64;
+                if self.plan.glass_shadows && !source.sampler.is_seen() {
+                    unseen.extend(before..s.ray_count());
+                }
             }
             s.close();
             self.trace_rays(s, counts);
+            unseen.iter().for_each(|k| self.follow(*k, s, counts));
             let seen: Rgb = s.highlights().sum();
             pixels.add(point.place.pixel, point.place.sample, point.throughput * seen);
         }
         s.tail = samples;
+        s.unseen = unseen;
     }
 }

@@ -1,8 +1,8 @@
 //! Light that shadow rays find behind glass: straight through, less what the glass reflects, tints and absorbs.
 //!
 //! Real glass bends light, and gathers it in caustics; this is a stand-in that a scene may choose
-//! ([`GlassShadows::Straight`](crate::scene::GlassShadows)). Diffuse surfaces and fog see light so; glossy ones see what is behind glass by the
-//! rays of their lobes. What glass reflects depends on the angle on its outer side at both crossings, as in a pane. Rough
+//! ([`GlassShadows::Straight`](crate::scene::GlassShadows)). Diffuse surfaces and fog see light so, and glossy ones lights without a surface; lamps and skies
+//! behind glass they see by the rays of their lobes. What glass reflects depends on the angle on its outer side at both crossings, as in a pane. Rough
 //! glass counts as polished. Where bodies overlap, each takes its share.
 
 use super::cone::RayCone;
@@ -10,6 +10,7 @@ use super::lobe::glass_at;
 use super::{Renderer, medium, optics};
 use crate::intersect::{Ray, SurfaceInteraction};
 use crate::math::Rgb;
+use crate::scene::Glass;
 use crate::stats::{RayCounts, RayKind};
 
 /// Surfaces of glass that a shadow ray passes at most.
@@ -30,9 +31,18 @@ impl Renderer<'_> {
     pub(super) fn through_glass(&self, ray: &Ray, counts: &mut RayCounts) -> Rgb {
         let scene = self.scene;
         let (mut ray, mut left) = (*ray, Rgb::ONE);
+        let unit = scene.recentring.length_to_world(ray.dir.length());
+        // The way from the last surface to the light's own, and the body that it lies in.
+        let (mut rest, mut body): (f64, Option<Glass>) = (1.0, None);
         for _ in 0..MOST_PASSED {
             counts[RayKind::ThroughGlass] += 1;
-            let Some(hit) = self.intersector.intersect(&ray, counts) else { return left };
+            let Some(hit) = self.intersector.intersect(&ray, counts) else {
+                // Without an end, it leaves a body that is open.
+                let body = body.filter(|_| ray.tfar.is_finite());
+                return left
+                    * body.map_or(Rgb::ONE, |body| medium::transmittance(&body, rest * unit));
+            };
+            rest -= hit.t;
             let si = SurfaceInteraction::new(scene, &ray, &hit);
             let material = &scene.materials[si.surface.material as usize];
             let wo = -ray.dir.normalize();
@@ -45,9 +55,10 @@ impl Renderer<'_> {
                 left *= glass.tint * (1.0 - optics::pane_reflectance(cos, glass.ior)) as f32;
             } else {
                 left *= glass.tint * (1.0 - optics::reflectance(cos.abs(), glass.ior)) as f32;
-                if !si.is_outside(wo) {
-                    let way = scene.recentring.length_to_world(hit.t * ray.dir.length());
-                    left *= medium::transmittance(glass, way);
+                // A ray that leaves one body goes on outside of all.
+                body = si.is_outside(wo).then_some(*glass);
+                if body.is_none() {
+                    left *= medium::transmittance(glass, hit.t * unit);
                 }
             }
             if left.max_element() < self.settings.cutoff {

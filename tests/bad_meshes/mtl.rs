@@ -64,6 +64,8 @@ const CASES: &[(&str, Expect)] = &[
     ("newmtl a\nmap_d gone.png\n", Warns(1, "cut-outs left out")),
     ("newmtl a\nmap_d -imfchan m bad.mtl\n", Warns(2, "texture option `-imfchan`")),
     ("newmtl a\nillum 7\nNi 1.5\nmap_d x.png\n", Warns(1, "glass has none")),
+    ("newmtl a\nillum 7\nNi 1.5\nmap_Kd x.png\n", Warns(1, "`map_Kd` is ignored")),
+    ("newmtl a\nd 0.9\nNi 1.5\n", Warns(1, "by less than half")),
     ("newmtl a\nKd 1 0 0\nnewmtl a\nKd 0 1 0\n", Warns(3, "defined again")),
     ("newmtl a\nd 0.5\n", Warns(1, "rendered opaque")),
     ("newmtl a\nillum 7\n", Warns(1, "glass without `Ni`")),
@@ -185,6 +187,22 @@ fn map_pr_is_one_channel_as_it_stands() {
     });
     let expected = [(1.0, Some(48.0 / 255.0)), (1.0, Some(128.0 / 255.0)), (0.25, None)];
     assert_eq!(rough.collect::<Vec<_>>(), expected);
+}
+
+#[test]
+fn what_has_an_image_reflects_no_more_than_all_light() {
+    let mtl = "newmtl a\nillum 3\nKs .8 .8 .8\nmap_Kd C:\\elsewhere\\image.ppm\n\
+               newmtl b\nillum 3\nKd .8 .8 .8\nKs .8 .8 .8\nmap_Kd image.ppm\n\
+               newmtl c\nillum 4\nd 0.5\nNi 1.5\nKd 0 0 0\nmap_Kd image.ppm\n";
+    let world = faces_of(mtl, &["a", "b", "c"], "image.ppm");
+    let of = |k: usize| &world.materials[k];
+    assert!(of(0).texture.is_some() && of(1).texture.is_some() && of(2).texture.is_none());
+    assert_eq!((of(1).diffuse.x, of(1).mirror.x), (0.5, 0.5));
+    assert!(
+        (of(0).diffuse.x - 1.0 / 1.8).abs() < 1e-6 && (of(0).mirror.x - 0.8 / 1.8).abs() < 1e-6
+    );
+    assert!(of(2).glass.is_some());
+    assert_eq!(of(2).diffuse.x, 0.0);
 }
 
 #[test]

@@ -2,14 +2,14 @@
 //!
 //! | MTL | ours |
 //! |---|---|
-//! | `Kd`, `map_Kd` | diffuse reflectance, texture |
+//! | `Kd`, `map_Kd` | diffuse reflectance, texture; nothing on glass |
 //! | `norm`; `map_Bump` and `bump` whose image looks like normals | normal map, `-bm` its strength; nothing on glass |
 //! | `map_d` | cut-outs: below a half the surface is not there; nothing on glass |
 //! | `-s`, `-o`, `-clamp` of images | how the image lies ([`super::image`]) |
 //! | `Ke`, `map_Ke` | emission, both sides, and its image |
 //! | `illum` 3 or 5 with `Ks` and without `Pm` or `Pc` | mirror of reflectance `Ks` beside the diffuse part; perfect, or of the roughness `Pr` or `map_Pr` |
 //! | `Pm`, `map_Pm`, `Pc`; `Pr`, `map_Pr` of what is no mirror | principled: metallic, clear coat (`Pcr` its roughness), roughness (else 0.5), the index of refraction `Ni` (else 1.5) |
-//! | `illum` 6 or 7; 4 or 9 unless `d` is 1 or `map_d` alone; `d` < 1 with `Ni` | glass: `Ni` (else 1.5), `Tf`, `Pr` or `map_Pr` (else polished) |
+//! | `illum` 6 or 7; 4 or 9 unless `d` is 1 or `map_d` alone; `d` of at most 0.5 with `Ni` | glass: `Ni` (else 1.5), `Tf`, `Pr` or `map_Pr` (else polished) |
 //! | `Ks` otherwise, `Ns`, `Ka` | nothing: no glossy highlights |
 
 use super::front::Source;
@@ -43,6 +43,9 @@ pub(super) fn of(source: &Source, mtl: &tobj::Material) -> (Material, Vec<String
             let line = bump.line;
             notes.push(format!("glass has no normal map: that of line {line} is ignored"));
         }
+        if source.texture.is_some() {
+            notes.push("texture left out: glass has none, `map_Kd` is ignored".into());
+        }
         if source.mask.is_some() {
             notes.push("cut-outs left out: glass has none, `map_d` is ignored".into());
         }
@@ -64,13 +67,18 @@ pub(super) fn of(source: &Source, mtl: &tobj::Material) -> (Material, Vec<String
         cover(&mut out, source, mtl);
         return (out, notes);
     }
-    let most = (out.diffuse + out.mirror).max_element();
-    if most > 1.0 {
-        out.diffuse /= most;
-        out.mirror /= most;
-        notes.push(format!("`Kd` and `Ks` reflect {most} of the light: scaled down to 1"));
-    }
     (out, notes)
+}
+
+/// Scales down what reflects more than all light, and says so. Layers share the light by themselves.
+pub(super) fn limit(material: &mut Material) -> Option<String> {
+    let most = (material.diffuse + material.mirror).max_element();
+    if most <= 1.0 || material.fresnel.is_some() {
+        return None;
+    }
+    material.diffuse /= most;
+    material.mirror /= most;
+    Some(format!("`Kd` and `Ks` reflect {most} of the light: scaled down to 1"))
 }
 
 /// The factor on the texture: `Kd`, or 1 if it is missing or black, since programs that write these beside a
@@ -120,14 +128,17 @@ fn cover(out: &mut Material, source: &Source, mtl: &tobj::Material) {
 
 fn is_glass(source: &Source, mtl: &tobj::Material, notes: &mut Vec<String>) -> bool {
     let clear = mtl.dissolve.is_some_and(|d| d < 1.0);
+    // Programs write an `Ni` with everything: what is more there than not is paint.
+    let is_mostly_there = mtl.dissolve.is_some_and(|d| d > 0.5);
     match mtl.illumination_model {
         Some(6 | 7) => true,
         // 3ds Max writes `illum 4` with `d 1` for what is plainly opaque. A map says what is transparent.
         Some(4 | 9) => clear || (mtl.dissolve.is_none() && source.mask.is_none()),
-        _ if clear && mtl.optical_density.is_some() => true,
+        _ if clear && mtl.optical_density.is_some() && !is_mostly_there => true,
         _ => {
             if clear {
-                notes.push("transparent (`d`, `Tr`) without `Ni`: rendered opaque".into());
+                let why = if is_mostly_there { "by less than half" } else { "without `Ni`" };
+                notes.push(format!("transparent (`d`, `Tr`) {why}: rendered opaque"));
             }
             false
         }

@@ -43,14 +43,14 @@ struct Taken<'s> {
 }
 
 impl Entry {
-    /// The images that count in `material`, as [`meaning::of`] has it: only mirrors, layers and glass are rough, only layers are metal, glass has no normal map and no
-    /// cut-outs.
+    /// The images that count in `material`, as [`meaning::of`] has it: only mirrors, layers and glass are rough, only layers are metal, glass has no texture, no
+    /// normal map and no cut-outs.
     fn taken(&self, material: &Material) -> Taken<'_> {
         let front::Source { texture, roughness_map, metallic_map, normal_map, .. } = &self.source;
         let front::Source { emission_map, mask, .. } = &self.source;
         let is_glass = material.glass.is_some();
         Taken {
-            texture: texture.as_ref(),
+            texture: texture.as_ref().filter(|_| !is_glass),
             roughness: roughness_map.as_ref().filter(|_| material.mirror != Rgb::ZERO || is_glass),
             metallic: metallic_map.as_ref().filter(|_| material.fresnel.is_some()),
             emission: emission_map.as_ref(),
@@ -74,8 +74,13 @@ impl Entry {
         images.into_iter().flatten().map(|(image, what)| (self.file(image), what))
     }
 
+    /// The file of an image; one of its name beside the library where it is not in the folder that is named, which may be one of
+    /// another machine.
     fn file(&self, image: &MapImage) -> PathBuf {
-        source::beside(&self.library, &image.name)
+        let named = source::beside(&self.library, &image.name);
+        let own = image.name.rsplit(['/', '\\']).next().unwrap_or_default();
+        let near = source::beside(&self.library, own);
+        if !named.exists() && near.is_file() { near } else { named }
     }
 
     /// The image as it lies on the surface, entered in the model's world.
@@ -258,6 +263,8 @@ impl Libraries {
                 material.diffuse = Rgb::ONE;
             }
         }
+        let scaled = meaning::limit(&mut material);
+        model.warnings.extend(scaled.map(|note| entry.warning(note)));
         if let Some(image) = mask {
             let what = (ImageUse::Mask, "cut-outs");
             material.alpha = entry.lay_or_warn(image, what, images, model);
