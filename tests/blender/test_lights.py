@@ -73,6 +73,57 @@ class Lights(Case):
         self.noted(lines, "softbox", "passes through", "camera does not see", "hides")
         self.noted(lines, "softbox", "diffuse rays")
 
+    def test_an_emission_node_colours_a_light(self):
+        for kind, where in (("AREA", "radiance"), ("POINT", "intensity"), ("SPOT", "intensity"), ("SUN", "irradiance")):
+            stage.fresh()
+            lamp = stage.light("lamp", kind, (0.0, 0.0, 3.0), energy=10.0, color=(1.0, 0.5, 1.0)).data
+            plain = export("plain-light")[0]["light"][0]
+            lamp.use_nodes = True
+            emission = next(node for node in lamp.node_tree.nodes if node.type == "EMISSION")
+            emission.inputs["Color"].default_value, emission.inputs["Strength"].default_value = (0.5, 0.25, 0.0, 1.0), 3.0
+            found, lines, _ = export("coloured-light")
+            [(name, entry)] = found["light"][0].items()
+            self.near(entry[where], [a * b for a, b in zip(plain[name][where], (1.5, 0.75, 0.0))])
+            self.assertFalse(any("nodes of the light" in line for line in lines), lines)
+
+    def mixed_by_light_paths(self, output):
+        """A scene whose world mixes a blue background and, by an output of the Light Path node, a red one."""
+        scene = stage.fresh()
+        stage.background(scene, (0.0, 0.0, 0.5))
+        tree = scene.world.node_tree
+        seen, mix, path = (tree.nodes.new(f"ShaderNode{kind}") for kind in ("Background", "MixShader", "LightPath"))
+        seen.inputs["Color"].default_value = (1.0, 0.0, 0.0, 1.0)
+        tree.links.new(path.outputs[output], mix.inputs[0])
+        for number, node in ((1, tree.nodes["Background"]), (2, seen)):
+            tree.links.new(node.outputs[0], mix.inputs[number])
+        tree.links.new(mix.outputs[0], tree.get_output_node("CYCLES").inputs["Surface"])
+        return scene
+
+    def test_the_world_that_lights_is_exported_not_the_one_that_the_camera_sees(self):
+        scene = self.mixed_by_light_paths("Is Camera Ray")
+        found, lines, _ = export("camera-ray")
+        self.near(found["sky"]["radiance"], [0.0, 0.0, 0.5])
+        self.noted(lines, "World", "Is Camera Ray", "the world that lights")
+        self.assertEqual((len(lines), len(bpy.data.worlds)), (1, 1))
+        # The file's own world is as it was.
+        mix = next(node for node in scene.world.node_tree.nodes if node.type == "MIX_SHADER")
+        self.assertEqual(mix.inputs[0].links[0].from_node.type, "LIGHT_PATH")
+
+    def test_worlds_that_depend_on_other_rays_are_noted(self):
+        from tweenray_export import world
+
+        size, world.SIZE = world.SIZE, (16, 8)
+        try:
+            scene = self.mixed_by_light_paths("Is Glossy Ray")
+            for ray in ("diffuse", "glossy", "transmission"):
+                setattr(scene.world.cycles_visibility, ray, False)
+            lines = export("glossy-ray")[1]
+        finally:
+            world.SIZE = size
+        self.noted(lines, "World", "depend on the ray")
+        for ray in ("diffuse", "glossy", "transmission"):
+            self.noted(lines, "World", f"invisible to {ray} rays")
+
     def test_a_background_and_images_of_the_sky(self):
         scene = stage.fresh()
         stage.background(scene, (0.1, 0.2, 0.4), 2.0)

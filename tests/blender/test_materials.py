@@ -235,6 +235,30 @@ class Materials(Case):
         red = rows[:, columns.index("red")]
         self.near(sorted(red), [0.0, 0.537099, 0.735357, 1.0], 1e-4)
 
+    def test_attributes_that_a_mesh_has_not_as_its_material_wants_them_are_noted(self):
+        def painted(name, colours, uv_map):
+            material = stage.principled(name)
+            nodes, links = material.node_tree.nodes, material.node_tree.links
+            shader, node, image, place = (nodes["Principled BSDF"], *(nodes.new(f"ShaderNode{kind}") for kind in ("VertexColor", "TexImage", "UVMap")))
+            node.layer_name, place.uv_map = colours, uv_map
+            image.image = stage.picture(f"{name}-image", np.full((2, 2, 4), 0.5, dtype=np.float32), "Non-Color")
+            links.new(node.outputs["Color"], shader.inputs["Base Color"])
+            links.new(place.outputs["UV"], image.inputs["Vector"])
+            links.new(image.outputs["Color"], shader.inputs["Roughness"])
+            return material
+
+        stage.fresh()
+        data = stage.mesh("bare", [(0, 0, 0), (1, 0, 0), (0, 1, 0)], [(0, 1, 2)], painted("p", "faces", "vectors"))
+        data.attributes.new("faces", "FLOAT_COLOR", "FACE")
+        data.attributes.new("vectors", "FLOAT_VECTOR", "CORNER")
+        stage.place("bare", data)
+        stage.place("floor", stage.plane(material=painted("q", "lost", "gone")))
+        _, lines, _ = export("attributes")
+        self.noted(lines, "bare", "the colour attribute faces", "FLOAT_COLOR", "FACE")
+        self.noted(lines, "bare", "the UV map vectors", "FLOAT_VECTOR", "no texture coordinates")
+        self.noted(lines, "floor", "the colour attribute lost, which it has not")
+        self.noted(lines, "floor", "the UV map gone, which it has not", "active one")
+
     def test_group_sockets_of_one_name_are_told_apart(self):
         def grouped():
             tree = bpy.data.node_groups.new("group", "ShaderNodeTree")

@@ -35,7 +35,18 @@ class Materials:
         return {name: made.table for name, made in self._made.items() if name in used}
 
     def light_factor(self, tree, name):
-        """The grey factor that a light's nodes put on its power; None where they are more than a constant emission."""
+        """The factor that a light's nodes put on the brightest channel of its power; None where they are more than a constant
+        emission. `light_tint` has the other channels."""
+        rgb = self._light_emission(tree, name)
+        return None if rgb is None else max(rgb)
+
+    def light_tint(self, light, name):
+        """The colour of the emission of a light's nodes, of which the brightest channel is 1."""
+        rgb = self._light_emission(light.node_tree, name) if light.use_nodes and light.node_tree is not None else None
+        return [c / max(rgb) for c in rgb] if rgb and max(rgb) > 0.0 else [1.0] * 3
+
+    def _light_emission(self, tree, name):
+        """Radiance of the constant emission that a light's nodes are, as a factor of its power, or None."""
         out = tree.get_output_node("CYCLES")
         fed = out and Place(out.inputs["Surface"]).fed()
         if not fed or fed.kind != "EMISSION":
@@ -44,8 +55,7 @@ class Materials:
         colour, power = (reader.of_place(fed.input(key)) for key in ("Color", "Strength"))
         if colour is None or power is None or not (colour.is_constant() and power.is_constant()):
             return None
-        rgb = colour.rgb()
-        return rgb[0] * power.grey() if max(rgb) - min(rgb) < 1e-6 else None
+        return [max(c * power.grey(), 0.0) for c in colour.rgb()]
 
     def _make(self, material, name):
         if material is None or material.node_tree is None:

@@ -56,11 +56,14 @@ class Meshes:
         layers = mesh.uv_layers
         active = next((layer for layer in layers if layer.active_render), None)
         if active is None:
+            for name in self.materials.uv_maps(material):
+                if name:
+                    self.report.add(mesh.name, f"the UV map {name}, {lacking(mesh, name)}", "no texture coordinates: its images show one colour")
             return []
         names = self.materials.uv_maps(material)
         for name in names:
             if name and name not in layers:
-                self.report.add(mesh.name, f"the UV map {name}, which it has not", "its active one")
+                self.report.add(mesh.name, f"the UV map {name}, {lacking(mesh, name)}", "its active one")
         return [layers.get(name, active) if name else active for name in names]
 
     def _colours(self, mesh, material):
@@ -68,7 +71,12 @@ class Meshes:
         if wanted is None:
             return None
         attributes = mesh.color_attributes
-        return attributes.get(wanted) if wanted else attributes.get(attributes.default_color_name or "")
+        name = wanted or attributes.default_color_name or ""
+        found = attributes.get(name)
+        if found is None:
+            what = f"the colour attribute {name}, {lacking(mesh, name)}" if name else "a colour attribute, which it has not"
+            self.report.add(mesh.name, what, "white" if name in mesh.attributes else "white, where Cycles has black")
+        return found
 
     def _heads(self, mesh, material):
         """Names of what `_corners` gives: position, normal, sets of texture coordinates, colour."""
@@ -115,6 +123,12 @@ class Meshes:
         first = 4 * np.arange(len(corners))[:, None]
         triangles = np.concatenate([first + [0, 1, 2], first + [0, 2, 3]], axis=1).reshape(-1)
         return self._file(name, points[triangles], POSITION)
+
+
+def lacking(mesh, name):
+    """Why the attribute of that name is not what a material wants it for."""
+    found = mesh.attributes.get(name)
+    return f"which is {found.data_type} of the domain {found.domain}" if found else "which it has not"
 
 
 def whole(items, name, count):

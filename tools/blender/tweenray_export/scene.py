@@ -206,9 +206,10 @@ class Export:
         if linking.receiver_collection is not None or linking.blocker_collection is not None:
             self.report.add(ob.name, "light linking", "it lights everything")
         entries, quads = lights.export(ob, matrix, self.materials, self.report)
-        self.lamps.extend(entries)
+        tint = self.materials.light_tint(ob.data, ob.name)
+        self.lamps.extend({kind: tinted(entry, tint) for kind, entry in lamp.items()} for lamp in entries)
         if quads is not None:
-            corners, radiance = quads
+            corners, radiance = quads[0], product(quads[1], tint)
             name = f"ellipse {ob.name}"
             file = self.meshes.quads(name, corners)
             identity = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]]
@@ -314,6 +315,16 @@ def camera_text(records):
     if keys:
         text += "keys = [\n" + "".join(f"    {toml.value(key)},\n" for key in keys) + "]\n"
     return text
+
+
+def tinted(entry, tint):
+    """A light's entry whose light is multiplied by the colour `tint`."""
+    return {key: product(value, tint) if key in ("radiance", "intensity", "irradiance") else value for key, value in entry.items()}
+
+
+def product(a, b):
+    """Two colours, channel by channel."""
+    return [x * y for x, y in zip(a, b)]
 
 
 def strips(scene):

@@ -30,25 +30,45 @@ class World:
             self.report.add(world.name, "the world is animated", f"as at frame {scene.frame_start}")
         if not world.cycles_visibility.camera:
             self.report.add(world.name, "a world that is invisible to the camera", "it is seen")
+        for ray in ("diffuse", "glossy", "transmission"):
+            if not getattr(world.cycles_visibility, ray):
+                self.report.add(world.name, f"a world that is invisible to {ray} rays", "they see it too")
         if world.node_tree is None:
             return self.constant(list(world.color))
         if world.node_tree.get_output_node("CYCLES") is None:
             return None
+        copy = world.copy()
+        # The values are those of the first frame, and the scene that renders the image stands at another.
+        for block in (copy, copy.node_tree):
+            block.animation_data_clear()
+        try:
+            return self.of_nodes(copy, world.name)
+        finally:
+            bpy.data.worlds.remove(copy)
+
+    def of_nodes(self, world, name):
+        """The table of a world that may be changed, and that the report calls `name`."""
         out = world.node_tree.get_output_node("CYCLES")
         if Place(out.inputs["Volume"]).fed() is not None:
-            self.report.add(world.name, "the volume of the world", "none")
-        fed = Place(out.inputs["Surface"]).fed()
+            self.report.add(name, "the volume of the world", "none")
+        surface = Place(out.inputs["Surface"])
+        if light_paths(surface):
+            if hide_from_lights(world.node_tree):
+                self.report.add(name, "what the camera alone sees of the world (Is Camera Ray)", "the camera sees the world that lights")
+            if light_paths(surface):
+                self.report.add(name, "nodes of the world that depend on the ray (Light Path)", "light and reflections have what a ray of the camera sees")
+        fed = chosen(surface.fed())
         if fed is None:
             return None
         if fed.kind == "BACKGROUND":
-            found = self.background(world, fed)
+            found = self.background(name, fed)
             if found is not False:
                 return found
-        return self.rendered(scene, world)
+        return self.rendered(world, name)
 
-    def background(self, world, fed):
+    def background(self, name, fed):
         """The table of a background of one colour or image; False where it is another."""
-        reader = Reader(world.name, self.report)
+        reader = Reader(name, self.report)
         strength, source = reader.of_place(fed.input("Strength")), fed.input("Color").fed()
         if strength is None or not strength.is_constant():
             return False
@@ -95,14 +115,52 @@ class World:
         rgb = [max(float(c), 0.0) for c in rgb]
         return {"radiance": rgb} if max(rgb) > 0.0 else None
 
-    def rendered(self, scene, world):
+    def rendered(self, world, name):
         """The table of an image of the world, which Cycles renders."""
-        self.report.add(world.name, "nodes of the world", f"an image of {SIZE[0]} x {SIZE[1]} that Cycles rendered of it")
+        self.report.add(name, "nodes of the world", f"an image of {SIZE[0]} x {SIZE[1]} that Cycles rendered of it")
         pixels = panorama(world)
         if not np.isfinite(pixels).all() or float(pixels.max()) <= 0.0:
-            self.report.add(world.name, "the world is black or has no finite radiance", "no sky")
+            self.report.add(name, "the world is black or has no finite radiance", "no sky")
             return None
-        return {"image": self.images.add(world.name, np.maximum(pixels, 0.0))}
+        return {"image": self.images.add(name, np.maximum(pixels, 0.0))}
+
+
+def light_paths(place):
+    """Whether a Light Path node has a say in what feeds the input at `place`."""
+    ahead, known = [place], set()
+    for place in ahead:
+        fed = place.fed()
+        if fed is None:
+            continue
+        if fed.kind == "LIGHT_PATH":
+            return True
+        key = fed.node.as_pointer(), tuple(group.as_pointer() for group in fed.groups)
+        if key not in known:
+            known.add(key)
+            ahead.extend(Place(socket, fed.groups) for socket in fed.node.inputs)
+    return False
+
+
+def hide_from_lights(tree):
+    """Puts 0 for Is Camera Ray, as it is for rays that look for light. Gives whether a node of the tree took it."""
+    links = [link for link in tree.links if link.from_node.type == "LIGHT_PATH" and link.from_socket.name == "Is Camera Ray"]
+    if not links:
+        return False
+    zero = tree.nodes.new("ShaderNodeValue")
+    zero.outputs[0].default_value = 0.0
+    for socket in [link.to_socket for link in links]:
+        tree.links.new(zero.outputs[0], socket)
+    return True
+
+
+def chosen(fed):
+    """The shader that a Mix Shader of the factor 0 lets through."""
+    while fed is not None and fed.kind == "MIX_SHADER":
+        factor = fed.input(0).fed()
+        if factor is None or factor.kind != "VALUE" or factor.output.default_value != 0.0:
+            break
+        fed = fed.input(1).fed()
+    return fed
 
 
 def panorama(world):
