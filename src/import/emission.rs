@@ -4,8 +4,13 @@
 //! gives lights their surface, so the sphere or mesh itself leaves the world. A mesh that reflects too, emits by an image,
 //! or has cut-outs stays, and the scene makes lights of its faces. A sphere by an image or with cut-outs casts no light.
 
+use super::framing;
 use super::lamps::cover;
+use crate::math::Rgb;
 use crate::scene::{Light, Material, QuadLight, SphereLight, World};
+
+/// Irradiance of a white surface that is seen as 25 of 255: less leaves all dark.
+pub(super) const DIM: f64 = 0.03;
 
 /// A note about an emitting surface, for a warning.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -45,6 +50,33 @@ impl Note {
             Self::ReflectsNothing(_) => "give it a material with `emission` alone".into(),
         }
     }
+}
+
+/// About the most irradiance that the emitting meshes of `world` send to its middle.
+pub(super) fn irradiance(world: &World) -> f64 {
+    let bounds = framing::bounds(world);
+    let middle = bounds.centre();
+    let nearest = 0.25 * (bounds.max - bounds.min).length();
+    let emission = |material: &Material| {
+        let mean = material.emission_map.map(|map| &world.textures[map.image as usize]);
+        let mean = mean.and_then(|image| image.levels().last());
+        material.emission * mean.map_or(Rgb::ONE, |level| level.texel(0, 0))
+    };
+    let mut sum = 0.0;
+    for mesh in &world.meshes {
+        let radiance = f64::from(emission(&world.materials[mesh.material as usize]).max_element());
+        if radiance == 0.0 {
+            continue;
+        }
+        let sent = mesh.triangles.iter().map(|triangle| {
+            let [a, b, c] = triangle.map(|corner| mesh.positions[corner as usize]);
+            let area = 0.5 * (b - a).cross(c - a).length();
+            let distance = ((a + b + c) / 3.0 - middle).length().max(nearest);
+            area / (distance * distance)
+        });
+        sum += radiance * sent.sum::<f64>();
+    }
+    sum
 }
 
 /// Turns emitting meshes from `first_mesh` on and spheres from `first_sphere` on into
@@ -97,7 +129,7 @@ fn dark(material: &Material, name: String) -> Note {
 mod tests {
     use super::*;
     use crate::import::lamps::MAX_LIGHTS;
-    use crate::math::{DVec3, Rgb};
+    use crate::math::Rgb;
     use crate::scene::{WorldMesh, WorldSphere};
 
     fn lamp(triangles: Vec<[u32; 3]>, raise: f64) -> WorldMesh {

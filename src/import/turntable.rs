@@ -61,6 +61,7 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Loaded> {
     }
     // What glows is no reason to leave out the lamp.
     let own_lights = has_lamps || !world.lights.is_empty();
+    let glow = emission::irradiance(&world);
     for note in emission::adopt(&mut world, 0, 0) {
         warnings.push(Diagnostic::new(path, note.message()).help(note.help()));
     }
@@ -79,7 +80,9 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Loaded> {
     let aspect = f64::from(settings.width.max(1)) / f64::from(settings.height.max(1));
     let (shot, stage) = match camera {
         Some(FileCamera { shot, .. }) => {
-            warnings.extend(light_up(&mut world, path));
+            if !own_lights && glow < emission::DIM {
+                warnings.push(light_up(&mut world, path, glow));
+            }
             (shot, None)
         }
         None => put_on_stage(&mut world, own_lights, aspect),
@@ -87,18 +90,17 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Loaded> {
     Ok(Loaded { warnings, files, stage, repeats, ..Loaded::new(world, shot, settings) })
 }
 
-/// Lights a scene that has a camera and nothing that shines, and says so.
-fn light_up(world: &mut World, path: &Path) -> Option<Diagnostic> {
-    let glows = world.meshes.iter().any(|mesh| world.materials[mesh.material as usize].emits());
-    if glows || !world.lights.is_empty() {
-        return None;
-    }
+/// Lights a scene that has a camera and nothing that shines on more than itself, and says so.
+fn light_up(world: &mut World, path: &Path, glow: f64) -> Diagnostic {
     world.sky = STUDIO_SKY;
     let irradiance = KEY_COLOUR * KEY_IRRADIANCE as f32;
     let to_light = key_direction();
     world.lights.push(Light::Directional(DirectionalLight { to_light, irradiance }));
-    let message = "the file has a camera but no light: a bright sky and a light from the upper left were added";
-    Some(Diagnostic::new(path, message).help("export the lights of the scene with it"))
+    let what = if glow > 0.0 { "but what glows dimly" } else { "at all" };
+    let message = format!(
+        "the file has a camera and no light {what}: a bright sky and a light from the upper left were added"
+    );
+    Diagnostic::new(path, message).help("export the lights of the scene with it")
 }
 
 /// Adds floor and lights to `world`, where the file has no lights of its own, and gives the camera's orbit.

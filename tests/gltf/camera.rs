@@ -59,7 +59,7 @@ fn a_still_camera_looks_along_its_nodes_minus_z() {
     assert!(forward(&loaded, 1).distance(DVec3::NEG_X) < 1e-12);
     assert_eq!(loaded.shot.vfov_degrees, YFOV.to_degrees());
     assert!(loaded.stage.is_none());
-    assert!(warns(&loaded.warnings, "the file has a camera but no light"));
+    assert!(warns(&loaded.warnings, "the file has a camera and no light at all"));
     assert!(matches!(loaded.world.lights[..], [Light::Directional(_)]));
 }
 
@@ -177,6 +177,36 @@ fn a_lens_is_moved_by_a_channel_without_a_node() {
     let height = loaded.shot.camera(2, 64, 48).expect("a camera").half_up.length();
     assert!((height - 0.375f64.tan()).abs() < 1e-12);
     assert!(warns(&loaded.warnings, "the animation of `/materials/N/alphaCutoff` is ignored"));
+}
+
+#[test]
+fn what_glows_dimly_is_no_light() {
+    let lit = |emission: f64| {
+        let mut file = filmed();
+        file.add("materials", json!({"emissiveFactor": [0, emission, 0]}));
+        let material = file.json["materials"].as_array().expect("materials").len() - 1;
+        file.primitive()["material"] = json!(material);
+        let loaded = file.loaded();
+        (loaded.world.lights.len(), warns(&loaded.warnings, "no light but what glows dimly"))
+    };
+    assert!(!lit(1.0).1);
+    let (lights, told) = lit(0.001);
+    assert!(told && lights >= 1, "{lights}");
+}
+
+#[test]
+fn mirrored_and_sheared_cameras_are_named() {
+    let told = |placed: Value| {
+        let mut file = filmed();
+        file.json["nodes"][2] = placed;
+        file.loaded().warnings.iter().find(|w| w.message.contains("as it is not")).cloned()
+    };
+    assert_eq!(told(json!({"camera": 0, "scale": [2, 3, 1], "translation": [0, 0, 5]})), None);
+    let mirrored = told(json!({"camera": 0, "scale": [-1, 1, 1], "translation": [0, 0, 5]}));
+    assert!(mirrored.expect("a warning").message.contains("mirrored"));
+    let matrix = [1., 0.5, 0., 0., 0., 1., 0., 0., 0., 0., 1., 0., 0., 0., 5., 1.];
+    let sheared = told(json!({"camera": 0, "matrix": matrix}));
+    assert!(sheared.expect("a warning").message.contains("sheared"));
 }
 
 #[test]

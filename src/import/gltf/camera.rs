@@ -9,7 +9,7 @@ use super::uri::shortened;
 use crate::error::{Diagnostic, Error, Result, counted};
 use crate::import::model::{CameraChoice, FileCamera, ModelOptions};
 use crate::import::source::Notes;
-use crate::math::{DAffine3, DVec3};
+use crate::math::{DAffine3, DMat3, DVec3};
 use crate::scene::{CameraPath, Easing, FramePose, Pose, Shot, ShotLens};
 use std::f64::consts::PI;
 
@@ -56,6 +56,7 @@ pub(super) fn read(
     let FileLens { vfov, aspect } = camera.lens()?;
     note_faulty(&all, camera, notes);
     let rig = Rig::of(camera, nodes, animations);
+    note_skewed(camera, &rig.world(options.time).matrix3, notes);
     let frames = rig.frames(document, options)?;
     let shot = Shot {
         path: rig.path(camera, frames, vfov, options)?,
@@ -112,6 +113,19 @@ fn note_faulty(all: &[Placed<'_>], used: &Placed<'_>, notes: &mut Notes) {
             notes.add(&format!("{}: it is left out", fault.message), None);
         }
     }
+}
+
+/// Says that a camera's own mirroring or shear is left out.
+fn note_skewed(camera: &Placed<'_>, axes: &DMat3, notes: &mut Notes) {
+    let [x, y, z] = [axes.x_axis, axes.y_axis, axes.z_axis].map(DVec3::normalize_or_zero);
+    let sheared = [x.dot(y), y.dot(z), z.dot(x)].iter().any(|cos| cos.abs() > 1e-3);
+    let what = match axes.determinant() {
+        d if d < 0.0 => "mirrored",
+        _ if sheared => "sheared",
+        _ => return,
+    };
+    let name = &camera.node_name;
+    notes.add(&format!("the camera on node `{name}` is {what}: it is rendered as it is not"), None);
 }
 
 /// All cameras of the scene, in the order of its nodes.

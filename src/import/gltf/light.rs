@@ -3,6 +3,7 @@
 use super::document::Document;
 use super::json::Json;
 use crate::error::{Diagnostic, Result};
+use crate::import::emission::DIM;
 use crate::import::framing;
 use crate::import::source::Notes;
 use crate::math::{DAffine3, DVec3, Rgb};
@@ -62,9 +63,6 @@ pub(super) fn read(
         _ => return Err(kind.fault("a light is `point`, `spot` or `directional`").into()),
     }))
 }
-
-/// Irradiance of a white surface that is seen as 25 of 255.
-const DIM: f64 = 0.03;
 
 /// Takes the numbers of lights that would leave all dark as W/sr and W/m², and says so: many programs write their own
 /// for candela and lux.

@@ -51,8 +51,7 @@ impl<'d> TextureTable<'d> {
         let texture = info.required("index")?.as_index(self.textures.len(), "texture")?;
         let texture = &self.textures[texture];
         let Some(image) = texture.index("source", self.images, "image")? else {
-            let message =
-                "the texture has no `source`: its image is of a format that only an extension has";
+            let message = "the texture has no `source`, so no image";
             let help = "export the file again with png or jpeg images";
             let unnamed = || texture.fault(message).help(help);
             return Err(extensions::packed(texture).unwrap_or_else(unnamed).into());
