@@ -129,7 +129,7 @@ fn dark(material: &Material, name: String) -> Note {
 mod tests {
     use super::*;
     use crate::import::lamps::MAX_LIGHTS;
-    use crate::math::Rgb;
+    use crate::math::{DVec3, Rgb};
     use crate::scene::{WorldMesh, WorldSphere};
 
     fn lamp(triangles: Vec<[u32; 3]>, raise: f64) -> WorldMesh {
