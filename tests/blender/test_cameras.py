@@ -33,6 +33,21 @@ class Cameras(Case):
             self.near(ours, (200.0 * x, 100.0 * (1.0 - y)), 1e-3)
         self.assertEqual(scene.frame_current, 5)
 
+    def test_the_active_camera_is_restored_where_markers_bind_others(self):
+        scene = stage.fresh(frames=2)
+        active = scene.camera
+        other = active.copy()
+        scene.collection.objects.link(other)
+        scene.timeline_markers.new("cut", frame=1).camera = other
+        scene.camera = active
+        export("bound")
+        self.assertEqual(scene.camera, active)
+        other.data = other.data.copy()
+        other.data.type = "ORTHO"
+        with self.assertRaises(ValueError):
+            export("bound")
+        self.assertEqual(scene.camera, active)
+
     def test_sensor_fit_decides_the_field_of_view(self):
         for fit, width, height, tangent in (("HORIZONTAL", 200, 100, 0.25 * 36 / 50), ("VERTICAL", 200, 100, 0.5 * 24 / 50), ("AUTO", 100, 200, 0.5 * 36 / 50)):
             scene = stage.fresh(width, height)

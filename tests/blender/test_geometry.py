@@ -108,6 +108,29 @@ class Geometry(Case):
         finally:
             exporter.MOST_COMPARED = kept
 
+    def test_particles_born_after_the_first_frame_count_in_the_budget(self):
+        scene = stage.fresh(frames=40)
+        block = stage.place("block", stage.cube())
+        emitter = stage.place("emitter", stage.plane())
+        emitter.modifiers.new("particles", "PARTICLE_SYSTEM")
+        particles = emitter.particle_systems[0].settings
+        particles.count, particles.frame_start, particles.frame_end, particles.lifetime = 500, 2.0, 3.0, 100.0
+        particles.render_type, particles.instance_object = "OBJECT", block
+        costs, real = [], exporter.places
+
+        def counted(depsgraph):
+            found = real(depsgraph)
+            costs.append(len(found))
+            return found
+
+        exporter.places = counted
+        try:
+            self.with_budget(2_000)
+        finally:
+            exporter.places = real
+        self.assertGreater(max(costs), 500)
+        self.assertLessEqual(len(costs), 3 + exporter.FEWEST_FRAMES)
+
     def test_forms_that_change_inside_their_box_are_noted(self):
         scene = stage.fresh(frames=3)
         ball = stage.place("ball", stage.ball(segments=16))
@@ -134,6 +157,10 @@ class Geometry(Case):
         material.node_tree.nodes.new("ShaderNodeGroup").node_tree = outer
         stage.place("block", stage.cube(material=material))
         self.assertEqual(export("groups")[1], [])
+        action = bpy.data.actions.new("without curves")
+        inner.animation_data_create().action = action
+        self.assertEqual(export("groups")[1], [])
+        inner.animation_data_clear()
         value.outputs[0].keyframe_insert("default_value", frame=1)
         self.noted(export("groups")[1], "grouped", "it is animated")
 

@@ -124,6 +124,46 @@ class Lights(Case):
         for ray in ("diffuse", "glossy", "transmission"):
             self.noted(lines, "World", f"invisible to {ray} rays")
 
+    def rendered(self, scene, name):
+        """(mean of the image that Cycles renders of a world of a gradient, the report's lines)."""
+        from tweenray_export import world
+
+        tree = scene.world.node_tree
+        tree.links.new(tree.nodes.new("ShaderNodeTexGradient").outputs[0], tree.nodes["Background"].inputs["Color"])
+        size, world.SIZE = world.SIZE, (16, 8)
+        try:
+            found, lines, folder = export(name)
+        finally:
+            world.SIZE = size
+        image = bpy.data.images.load(os.path.join(folder, found["sky"]["image"]))
+        return np.mean(np.array(image.pixels[:]).reshape(-1, 4)[:, :3]), lines
+
+    def test_a_world_that_the_camera_does_not_see_still_lights(self):
+        scene = stage.fresh()
+        scene.world.cycles_visibility.camera = False
+        mean, lines = self.rendered(scene, "invisible-sky")
+        self.assertGreater(mean, 0.1)
+        self.noted(lines, "invisible to the camera")
+        self.assertFalse(scene.world.cycles_visibility.camera)
+
+    def test_the_volume_of_a_world_does_not_hide_its_surface(self):
+        scene = stage.fresh()
+        tree = scene.world.node_tree
+        volume = tree.get_output_node("CYCLES").inputs["Volume"]
+        tree.links.new(tree.nodes.new("ShaderNodeVolumeScatter").outputs[0], volume)
+        mean, lines = self.rendered(scene, "misty-sky")
+        self.assertGreater(mean, 0.1)
+        self.noted(lines, "the volume of the world")
+        self.assertTrue(volume.is_linked)
+
+    def test_a_light_path_that_does_not_reach_the_surface_is_not_noted(self):
+        scene = self.mixed_by_light_paths("Is Glossy Ray")
+        tree = scene.world.node_tree
+        path = next(node for node in tree.nodes if node.type == "LIGHT_PATH")
+        tree.links.new(path.outputs["Is Camera Ray"], tree.nodes.new("ShaderNodeMath").inputs[0])
+        lines = self.rendered(scene, "idle-camera-ray")[1]
+        self.assertFalse(any("Is Camera Ray" in line for line in lines), lines)
+
     def test_a_background_and_images_of_the_sky(self):
         scene = stage.fresh()
         stage.background(scene, (0.1, 0.2, 0.4), 2.0)

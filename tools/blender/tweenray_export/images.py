@@ -24,7 +24,8 @@ class Images:
 
     def __init__(self, folder, report):
         self.folder, self.report = folder, report
-        self._files, self._names, self._transparent = {}, set(), {}
+        self._files, self._names = {}, set()
+        self._transparent, self._greys = {}, {}
 
     def colour(self, image, times_alpha=False):
         """The file of an image of colours, `times_alpha` or as they are, or None where it has no pixels."""
@@ -74,8 +75,10 @@ class Images:
 
     def is_grey(self, image):
         """Whether red, green and blue are the same everywhere."""
-        pixels = self._pixels(image)
-        return pixels is None or float(np.abs(pixels[..., :3] - pixels[..., :1]).max()) < 1e-6
+        if image.name_full not in self._greys:
+            pixels = self._pixels(image)
+            self._greys[image.name_full] = pixels is None or float(np.abs(pixels[..., :3] - pixels[..., :1]).max()) < 1e-6
+        return self._greys[image.name_full]
 
     def add(self, name, pixels):
         """The file of an array of linear radiance, (rows, columns, 3), row 0 at the bottom."""
@@ -145,7 +148,7 @@ class Images:
 
     def is_opaque(self, image):
         """Whether it has pixels, and no alpha below 1."""
-        return self._pixels(image) is not None and not self.is_transparent(image)
+        return has_pixels(image) and not self.is_transparent(image)
 
     def _linear(self, image, times_alpha=False):
         """Linear colours `times_alpha` or as they are, and alpha, or None. Cycles multiplies codes by alpha before it decodes them."""
@@ -201,12 +204,13 @@ class Images:
         return self._write(image.name, ".png", png(np.rint(65535.0 * np.clip(pixels[..., :3], 0.0, 1.0)).astype(">u2")))
 
     def _pixels(self, image):
-        """(rows, columns, 4), row 0 at the bottom, or None where there are none."""
-        width, height = image.size
-        if width == 0 or height == 0 or len(image.pixels) != 4 * width * height:
+        """(rows, columns, 4), row 0 at the bottom, 0 for NaN; None where there are none."""
+        if not has_pixels(image):
             return None
+        width, height = image.size
         pixels = np.empty(4 * width * height, dtype=np.float32)
         image.pixels.foreach_get(pixels)
+        pixels = np.where(np.isnan(pixels), np.float32(0.0), pixels) if image.is_float else pixels
         return pixels.reshape(height, width, 4)
 
     def _exr(self, name, pixels):
@@ -231,6 +235,12 @@ class Images:
     def _place(self, name, ending):
         os.makedirs(os.path.join(self.folder, "textures"), exist_ok=True)
         return "textures/" + free_name(os.path.splitext(name)[0], self._names) + ending
+
+
+def has_pixels(image):
+    """Whether an image has pixels, of four channels as Blender gives them; none is copied."""
+    width, height = image.size
+    return width > 0 and height > 0 and len(image.pixels) == 4 * width * height
 
 
 def ending_of(head):

@@ -30,8 +30,17 @@ def is_animated(block):
     blocks = [block] if block else []
     for found in blocks:
         data = found.animation_data
-        if data and (data.action or data.drivers or data.nla_tracks):
+        if data and (has_curves(data.action) or data.drivers or data.nla_tracks):
             return True
         groups = [getattr(node, "node_tree", None) for node in getattr(found, "nodes", ())]
         blocks.extend(group for group in groups if group and group not in blocks)
     return False
+
+
+def has_curves(action):
+    """Whether an action, or None, has any curve. Layers came with Blender 4.4; the list of all curves went with 5.0."""
+    if action is None:
+        return False
+    strips = [strip for layer in getattr(action, "layers", ()) for strip in layer.strips]
+    holders = [action, *(bag for strip in strips for bag in getattr(strip, "channelbags", ()))]
+    return any(len(getattr(holder, "fcurves", ())) > 0 for holder in holders)

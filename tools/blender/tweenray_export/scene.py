@@ -23,7 +23,7 @@ SURFACES = {"MESH", "CURVE", "SURFACE", "META", "FONT"}
 MOST_BYTES = 16 << 20
 # To find what moves: instances (or thousands of points of meshes) that are looked at in all frames together, frames that are
 # looked at however large the scene is, and points of a mesh.
-MOST_COMPARED, FEWEST_FRAMES, MOST_POINTS = 100_000, 6, 10_000
+MOST_COMPARED, FEWEST_FRAMES, MOST_POINTS = 100_000, 6, 2_000
 
 
 class Engine(bpy.types.RenderEngine):
@@ -61,7 +61,7 @@ def write(scene, folder):
     # Freestyle draws its lines in a depsgraph of its own, which crashes without a picture.
     switches = ("use_compositing", "use_sequencer", "use_freestyle", "use_multiview")
     kept = {name: getattr(render, name) for name in ("engine", *switches)}
-    frame = scene.frame_current, scene.frame_subframe
+    frame, camera_before = (scene.frame_current, scene.frame_subframe), scene.camera
     bpy.utils.register_class(Engine)
     try:
         # Materials, world and settings are read as they are in the file, to which animated values are written here.
@@ -81,6 +81,8 @@ def write(scene, folder):
         for name, value in kept.items():
             setattr(render, name, value)
         scene.frame_set(frame[0], subframe=frame[1])
+        # Markers bind cameras to frames, and `frame_set` makes them active.
+        scene.camera = camera_before
         bpy.utils.unregister_class(Engine)
     if export.error is not None:
         raise export.error
@@ -116,9 +118,15 @@ class Export:
                 self.clipping = camera.Clipping(scene.camera.evaluated_get(depsgraph), self.report)
                 self.geometry(depsgraph)
                 before = places(depsgraph)
-                compared = {frames[i] for i in compared_frames(len(frames), cost(before))}
+                dearest = cost(before)
+                compared = {frames[i] for i in compared_frames(len(frames), dearest)}
             elif frame in compared:
-                self.note_moves(before, places(depsgraph), frames[0])
+                now = places(depsgraph)
+                self.note_moves(before, now, frames[0])
+                # Particles may be born: fewer of the frames to come are compared where each costs more.
+                if (price := cost(now)) > dearest:
+                    dearest = price
+                    compared &= {frames[i] for i in compared_frames(len(frames), dearest)}
         camera.note_blades(self.records, scene.name, self.report)
 
     def camera(self, depsgraph):
@@ -141,7 +149,7 @@ class Export:
             # Many objects share a form, which is compared once.
             pair = id(form), id(new_form)
             if pair not in bent:
-                bent[pair] = differ(form, new_form)
+                bent[pair] = form[0] != new_form[0] or differ(form[1], new_form[1])
             if bent[pair] or differ(place, new_place):
                 self.report.add(name, "it moves or changes during the shot", f"it stays as at frame {frame}")
 
@@ -227,7 +235,8 @@ class Export:
             if not made.is_seen:
                 continue
             name = material.name_full if material else DEFAULT
-            if material and (is_animated(material) or is_animated(material.node_tree)):
+            is_new = material and name not in self.used
+            if is_new and (is_animated(material) or is_animated(material.node_tree)):
                 self.report.add(name, "it is animated", f"as at frame {self.scene.frame_start}")
             self.used.add(name)
             self.placed.append((ob.name, file, name, axes.matrix(matrix)))
@@ -359,11 +368,11 @@ def compared_frames(count, cost):
 def cost(found):
     """What `places` costs: instances, and points of the different forms by the thousand."""
     forms = {id(form): form for _, form in found.values()}
-    return 1 + len(found) + int(sum(form[0] for form in forms.values())) // 1000
+    return 1 + len(found) + (sum(count for count, _ in forms.values())) // 1000
 
 
 def places(depsgraph):
-    """{(name, which of its instances): (numbers of its placement, points of its form)} of what is seen."""
+    """{(name, which of its instances): (numbers of its placement, its form)} of what is seen."""
     found, forms = {}, {}
     for instance in depsgraph.object_instances:
         ob = instance.object
@@ -378,20 +387,20 @@ def places(depsgraph):
 
 
 def form(ob):
-    """What changes where an object is bent, or where a light gets brighter, after how many points and corners it has:
-    of a mesh its box, evenly chosen points and their texture coordinates."""
+    """(how many points and corners an object has, numbers that change where it is bent or where a light gets brighter). The numbers
+    of a mesh are its box, evenly chosen points and texture coordinates, as float32: there may be thousands of meshes."""
     if ob.type == "LIGHT":
-        return np.array([0, ob.data.energy, *ob.data.color])
-    box = np.array(ob.bound_box).reshape(-1)
+        return 0, np.array([ob.data.energy, *ob.data.color], dtype=np.float32)
+    box = np.array(ob.bound_box, dtype=np.float32).reshape(-1)
     if ob.type != "MESH":
-        return np.array([0, *box])
+        return 0, box
     mesh = ob.data
     points = floats(mesh.vertices, "co", len(mesh.vertices), 3)
-    parts = [[len(points) + len(mesh.loops)], box, chosen(points)]
+    parts = [box, chosen(points)]
     layer = next((layer for layer in mesh.uv_layers if layer.active_render), None)
     if layer is not None:
         parts.append(chosen(floats(layer.uv, "vector", len(layer.uv), 2)))
-    return np.concatenate(parts)
+    return len(points) + len(mesh.loops), np.concatenate(parts, dtype=np.float32)
 
 
 def chosen(rows):

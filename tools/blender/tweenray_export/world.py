@@ -38,6 +38,8 @@ class World:
         if world.node_tree.get_output_node("CYCLES") is None:
             return None
         copy = world.copy()
+        # A world that the camera does not see would be rendered black.
+        copy.cycles_visibility.camera = True
         # The values are those of the first frame, and the scene that renders the image stands at another.
         for block in (copy, copy.node_tree):
             block.animation_data_clear()
@@ -51,9 +53,13 @@ class World:
         out = world.node_tree.get_output_node("CYCLES")
         if Place(out.inputs["Volume"]).fed() is not None:
             self.report.add(name, "the volume of the world", "none")
+            # The volume would hide the surface in a rendered image.
+            for link in list(out.inputs["Volume"].links):
+                world.node_tree.links.remove(link)
         surface = Place(out.inputs["Surface"])
-        if light_paths(surface):
-            if hide_from_lights(world.node_tree):
+        rays = light_paths(surface)
+        if rays:
+            if "Is Camera Ray" in rays and hide_from_lights(world.node_tree):
                 self.report.add(name, "what the camera alone sees of the world (Is Camera Ray)", "the camera sees the world that lights")
             if light_paths(surface):
                 self.report.add(name, "nodes of the world that depend on the ray (Light Path)", "light and reflections have what a ray of the camera sees")
@@ -126,19 +132,20 @@ class World:
 
 
 def light_paths(place):
-    """Whether a Light Path node has a say in what feeds the input at `place`."""
-    ahead, known = [place], set()
+    """The names of the outputs of Light Path nodes that have a say in what feeds the input at `place`."""
+    ahead, known, names = [place], set(), set()
     for place in ahead:
         fed = place.fed()
         if fed is None:
             continue
         if fed.kind == "LIGHT_PATH":
-            return True
+            names.add(fed.output.name)
+            continue
         key = fed.node.as_pointer(), tuple(group.as_pointer() for group in fed.groups)
         if key not in known:
             known.add(key)
             ahead.extend(Place(socket, fed.groups) for socket in fed.node.inputs)
-    return False
+    return names
 
 
 def hide_from_lights(tree):
