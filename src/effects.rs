@@ -32,7 +32,7 @@ pub struct EffectPlan {
     pub sky_light: bool,
     /// Rays that leave the scene see more than one colour: an environment, or a sun.
     pub environment: bool,
-    /// Light goes straight through glass, to diffuse surfaces and fog.
+    /// Light goes straight through glass, to diffuse surfaces and fog, and of lights without a surface to glossy ones.
     pub glass_shadows: bool,
     /// A medium between the surfaces takes light from rays and scatters some towards them.
     pub fog: bool,

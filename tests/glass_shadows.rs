@@ -117,7 +117,7 @@ fn a_lamp_inside_of_a_body_lights_through_it() {
     close(amber, clear * (-absorption).exp(), 1e-4);
 }
 
-/// A lobe cannot find lights without a surface, so that their own rays go through glass.
+/// No ray of a lobe ends on lights without a surface, so that their own rays go through polished glass. Rough glass has a lobe of its own.
 #[test]
 fn highlights_of_lights_without_a_surface_go_through() {
     let position = DVec3::new(-2.0, 5.0, 0.3);
@@ -140,6 +140,21 @@ fn highlights_of_lights_without_a_surface_go_through() {
         println!("a highlight behind a pane: {share}");
         assert!(open.x > 0.0);
         close(share, TINT, 1e-4);
+        let frosted = |glass_shadows| {
+            let frost = Glass { roughness: 0.3, thin: true, ..Glass::clear(1.5) };
+            let mut world = world(Some((glass(frost), false)));
+            world.materials[0] = Material {
+                diffuse: Rgb::ZERO,
+                mirror: Rgb::ONE,
+                roughness: 0.7,
+                ..world.materials[0].clone()
+            };
+            world.lights = lights.clone();
+            let mut job = job(world);
+            job.settings.glass_shadows = glass_shadows;
+            render(&job).0.rgb[0]
+        };
+        assert_eq!(frosted(GlassShadows::Straight), frosted(GlassShadows::Opaque));
     }
 }
 

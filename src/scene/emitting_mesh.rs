@@ -20,7 +20,7 @@ const MOST_PARTS: usize = 512;
 const SMALL: f64 = 0.01;
 /// Faces that together send this share of a mesh's light cast none: black that is nearly so would be thousands of lights.
 const LEAST: f64 = 1e-3;
-/// Most rows of points by which a part of a face with holes is averaged.
+/// Most rows of points by which a part of a face with holes is averaged; up to eight times as many for a whole one of few faces.
 const HOLE_ROWS: u32 = 32;
 /// The golden ratio, whose multiples have fractions that lie evenly.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
@@ -180,8 +180,8 @@ impl<'m> Emission<'m> {
         self.colour * mean_between(image, map, corners)
     }
 
-    /// The mean radiance of a part of face `at` of what has holes: of points in rows, each anywhere between its neighbours, since
-    /// even rows would meet a pattern that repeats always at the same places.
+    /// The mean radiance of a part of face `at` of what has holes: of points in rows, each anywhere in a small triangle of its
+    /// own, since even rows would meet a pattern that repeats always at the same places.
     fn mean_there(&self, at: usize, part: Part, mask: &LaidMask<'_>) -> Rgb {
         let triangle = self.mesh.triangles[at];
         let corners_of = |uvs: Option<&Corners<Vec2>>| {
@@ -207,8 +207,13 @@ impl<'m> Emission<'m> {
             let uvs = corners.map(|uv| map.transform.transform_point2(uv));
             texels(uvs, [level.width, level.height])
         });
-        let is_fine = self.mesh.triangles.len() > MOST_FACE_LIGHTS;
-        let most = if is_fine { HOLE_ROWS / 4 } else { HOLE_ROWS };
+        let faces = self.mesh.triangles.len();
+        let most = match share {
+            _ if faces > MOST_FACE_LIGHTS => HOLE_ROWS / 4,
+            // What a whole face sends is all that is known of it where its parts are alike.
+            1.0 => HOLE_ROWS * ((MOST_PARTS / faces.max(1)).isqrt() as u32).clamp(1, 8),
+            _ => HOLE_ROWS,
+        };
         let wanted = 2.0 * (share * on_mask.max(on_image)).sqrt();
         // NaN counts as few.
         let rows = wanted.max(4.0).min(f64::from(most)) as u32;
@@ -337,7 +342,11 @@ impl<'m> Emission<'m> {
                 *mean = self.mean(at, within(part, quarter));
             }
             let whole = quarters.iter().sum::<Rgb>() / 4.0;
-            quarters.iter().map(|mean| f64::from((*mean - whole).abs().element_sum()) * area).sum()
+            // Of a fine pattern of holes means differ by chance, which smaller parts do not mend.
+            let chance =
+                if self.mask.is_some() { whole * (2.0 / HOLE_ROWS as f32) } else { Rgb::ZERO };
+            let apart = |mean: &Rgb| ((*mean - whole).abs() - chance).max(Rgb::ZERO).element_sum();
+            quarters.iter().map(|mean| f64::from(apart(mean)) * area).sum()
         };
         // Summed in order, whatever thread comes first.
         let all: Vec<Part> = parts(rows).collect();

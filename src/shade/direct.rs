@@ -704,12 +704,7 @@ impl Renderer<'_> {
     }
 
     /// Traces the batch's rays, to a light that may lie behind glass.
-    pub(super) fn trace_light(
-        &self,
-        source: &LightSource,
-        s: &mut ShadowScratch,
-        counts: &mut RayCounts,
-    ) {
+    fn trace_light(&self, source: &LightSource, s: &mut ShadowScratch, counts: &mut RayCounts) {
         counts[source.rays] += s.rays.len() as u64;
         self.trace_through(s, counts);
     }
@@ -718,16 +713,22 @@ impl Renderer<'_> {
     pub(super) fn trace_through(&self, s: &mut ShadowScratch, counts: &mut RayCounts) {
         self.trace_rays(s, counts);
         if self.plan.glass_shadows {
-            (0..s.rays.len()).for_each(|k| self.follow(k, s, counts));
+            (0..s.rays.len()).for_each(|k| self.follow(k, false, s, counts));
         }
     }
 
-    /// Follows the batch's ray number `k`, if it is occluded, straight through glass.
-    pub(super) fn follow(&self, k: usize, s: &mut ShadowScratch, counts: &mut RayCounts) {
+    /// Follows the batch's ray number `k`, if it is occluded, straight through glass; `if_polished`, through no other.
+    pub(super) fn follow(
+        &self,
+        k: usize,
+        if_polished: bool,
+        s: &mut ShadowScratch,
+        counts: &mut RayCounts,
+    ) {
         if !s.occluded[k] {
             return;
         }
-        let left = self.through_glass(&s.rays[k], counts);
+        let left = self.through_glass(&s.rays[k], if_polished, counts);
         if left == Rgb::ZERO {
             return;
         }

@@ -145,11 +145,10 @@ impl Renderer<'_> {
                     self.highlight_rays(source, point, n as f64, &mut u, draw, s);
                     s.close();
                 }
-                // What lies behind glass, the lobe's rays see.
-                if source.sampler.is_seen() {
-                    self.trace_shadow_rays(source, s, counts);
-                } else {
-                    self.trace_light(source, s, counts);
+                self.trace_shadow_rays(source, s, counts);
+                // All else that lies behind glass the lobe's rays see, lit by the lobes of rough glass too.
+                if self.plan.glass_shadows && !source.sampler.is_seen() {
+                    (0..s.ray_count()).for_each(|k| self.follow(k, true, s, counts));
                 }
                 for (point, seen) in group().zip(s.highlights()) {
                     let light = point.throughput * source.sampler.emission * seen;
@@ -219,7 +218,7 @@ impl Renderer<'_> {
             }
             s.close();
             self.trace_rays(s, counts);
-            unseen.iter().for_each(|k| self.follow(*k, s, counts));
+            unseen.iter().for_each(|k| self.follow(*k, true, s, counts));
             let seen: Rgb = s.highlights().sum();
             pixels.add(point.place.pixel, point.place.sample, point.throughput * seen);
         }

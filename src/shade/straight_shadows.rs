@@ -1,8 +1,8 @@
 //! Light that shadow rays find behind glass: straight through, less what the glass reflects, tints and absorbs.
 //!
 //! Real glass bends light, and gathers it in caustics; this is a stand-in that a scene may choose
-//! ([`GlassShadows::Straight`](crate::scene::GlassShadows)). Diffuse surfaces and fog see light so, and glossy ones lights without a surface; lamps and skies
-//! behind glass they see by the rays of their lobes. What glass reflects depends on the angle on its outer side at both crossings, as in a pane. Rough
+//! ([`GlassShadows::Straight`](crate::scene::GlassShadows)). Diffuse surfaces and fog see light so. Glossy ones see lights without a surface
+//! so behind polished glass; they see lamps and skies, and all that lies behind rough glass, by the rays of their lobes. What glass reflects depends on the angle on its outer side at both crossings, as in a pane. Rough
 //! glass counts as polished. Where bodies overlap, each takes its share.
 
 use super::cone::RayCone;
@@ -27,8 +27,14 @@ impl Renderer<'_> {
         (light - kept).abs().max_element() > 1e-3 * light.max_element()
     }
 
-    /// The part of light that arrives along a shadow ray that meets something: none if that is no glass.
-    pub(super) fn through_glass(&self, ray: &Ray, counts: &mut RayCounts) -> Rgb {
+    /// The part of light that arrives along a shadow ray that meets something: none if that is no glass, or `if_polished` and it is
+    /// rough.
+    pub(super) fn through_glass(
+        &self,
+        ray: &Ray,
+        if_polished: bool,
+        counts: &mut RayCounts,
+    ) -> Rgb {
         let scene = self.scene;
         let (mut ray, mut left) = (*ray, Rgb::ONE);
         let unit = scene.recentring.length_to_world(ray.dir.length());
@@ -39,8 +45,8 @@ impl Renderer<'_> {
             let Some(hit) = self.intersector.intersect(&ray, counts) else {
                 // Without an end, it leaves a body that is open.
                 let body = body.filter(|_| ray.tfar.is_finite());
-                return left
-                    * body.map_or(Rgb::ONE, |body| medium::transmittance(&body, rest * unit));
+                let rest = rest.max(0.0) * unit;
+                return left * body.map_or(Rgb::ONE, |body| medium::transmittance(&body, rest));
             };
             rest -= hit.t;
             let si = SurfaceInteraction::new(scene, &ray, &hit);
@@ -49,17 +55,21 @@ impl Renderer<'_> {
             let seen = (&si, wo, RayCone { width: 0.0, spread: 0.0 });
             let Some(part) = glass_at(scene, material, seen) else { return Rgb::ZERO };
             let glass = &part.glass;
+            if if_polished && glass.is_rough() {
+                return Rgb::ZERO;
+            }
             left *= part.share;
+            let is_inner = !glass.thin && !si.is_outside(wo);
+            if let Some(body) = body.or(is_inner.then_some(*glass)) {
+                left *= medium::transmittance(&body, hit.t * unit);
+            }
             let cos = wo.dot(si.ns);
             if glass.thin {
                 left *= glass.tint * (1.0 - optics::pane_reflectance(cos, glass.ior)) as f32;
             } else {
                 left *= glass.tint * (1.0 - optics::reflectance(cos.abs(), glass.ior)) as f32;
-                // A ray that leaves one body goes on outside of all.
-                body = si.is_outside(wo).then_some(*glass);
-                if body.is_none() {
-                    left *= medium::transmittance(glass, hit.t * unit);
-                }
+                // Where a ray leaves one body the next surface says whether it lies in another.
+                body = (!is_inner).then_some(*glass);
             }
             if left.max_element() < self.settings.cutoff {
                 return Rgb::ZERO;

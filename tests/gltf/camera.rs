@@ -199,7 +199,7 @@ fn mirrored_and_sheared_cameras_are_named() {
     let told = |placed: Value| {
         let mut file = filmed();
         file.json["nodes"][2] = placed;
-        file.loaded().warnings.iter().find(|w| w.message.contains("as it is not")).cloned()
+        file.loaded().warnings.iter().find(|w| w.message.contains("which is ignored")).cloned()
     };
     assert_eq!(told(json!({"camera": 0, "scale": [2, 3, 1], "translation": [0, 0, 5]})), None);
     let mirrored = told(json!({"camera": 0, "scale": [-1, 1, 1], "translation": [0, 0, 5]}));

@@ -56,8 +56,8 @@ pub(super) fn read(
     let FileLens { vfov, aspect } = camera.lens()?;
     note_faulty(&all, camera, notes);
     let rig = Rig::of(camera, nodes, animations);
-    note_skewed(camera, &rig.world(options.time).matrix3, notes);
     let frames = rig.frames(document, options)?;
+    note_skewed(camera, &rig.world(frames.start).matrix3, notes);
     let shot = Shot {
         path: rig.path(camera, frames, vfov, options)?,
         easing: Easing::Linear,
@@ -115,17 +115,17 @@ fn note_faulty(all: &[Placed<'_>], used: &Placed<'_>, notes: &mut Notes) {
     }
 }
 
-/// Says that a camera's own mirroring or shear is left out.
+/// Says that the mirroring or shear of a camera is ignored.
 fn note_skewed(camera: &Placed<'_>, axes: &DMat3, notes: &mut Notes) {
     let [x, y, z] = [axes.x_axis, axes.y_axis, axes.z_axis].map(DVec3::normalize_or_zero);
     let sheared = [x.dot(y), y.dot(z), z.dot(x)].iter().any(|cos| cos.abs() > 1e-3);
-    let what = match axes.determinant() {
-        d if d < 0.0 => "mirrored",
+    let what = match x.cross(y).dot(z) {
+        volume if volume < -1e-6 => "mirrored",
         _ if sheared => "sheared",
         _ => return,
     };
     let name = &camera.node_name;
-    notes.add(&format!("the camera on node `{name}` is {what}: it is rendered as it is not"), None);
+    notes.add(&format!("the camera on node `{name}` is {what}, which is ignored"), None);
 }
 
 /// All cameras of the scene, in the order of its nodes.

@@ -78,7 +78,8 @@ pub(super) fn limit(material: &mut Material) -> Option<String> {
     }
     material.diffuse /= most;
     material.mirror /= most;
-    Some(format!("`Kd` and `Ks` reflect {most} of the light: scaled down to 1"))
+    let diffuse = if material.texture.is_some() { "`Kd` times `map_Kd`" } else { "`Kd`" };
+    Some(format!("{diffuse} and `Ks` reflect up to {most} of the light: scaled down to 1"))
 }
 
 /// The factor on the texture: `Kd`, or 1 if it is missing or black, since programs that write these beside a
@@ -128,7 +129,7 @@ fn cover(out: &mut Material, source: &Source, mtl: &tobj::Material) {
 
 fn is_glass(source: &Source, mtl: &tobj::Material, notes: &mut Vec<String>) -> bool {
     let clear = mtl.dissolve.is_some_and(|d| d < 1.0);
-    // Programs write an `Ni` with everything: what is more there than not is paint.
+    // Programs write an `Ni` with everything: what is more than half opaque is paint.
     let is_mostly_there = mtl.dissolve.is_some_and(|d| d > 0.5);
     match mtl.illumination_model {
         Some(6 | 7) => true,

@@ -74,13 +74,13 @@ impl Entry {
         images.into_iter().flatten().map(|(image, what)| (self.file(image), what))
     }
 
-    /// The file of an image; one of its name beside the library where it is not in the folder that is named, which may be one of
-    /// another machine.
+    /// The file of an image; of one in a folder of another machine the one of its name beside the library.
     fn file(&self, image: &MapImage) -> PathBuf {
         let named = source::beside(&self.library, &image.name);
+        let is_whole = image.name.starts_with(['/', '\\']) || image.name.get(1..2) == Some(":");
         let own = image.name.rsplit(['/', '\\']).next().unwrap_or_default();
         let near = source::beside(&self.library, own);
-        if !named.exists() && near.is_file() { near } else { named }
+        if is_whole && !named.exists() && near.is_file() { near } else { named }
     }
 
     /// The image as it lies on the surface, entered in the model's world.
