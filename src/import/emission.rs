@@ -4,7 +4,7 @@
 //! gives lights their surface, so the sphere or mesh itself leaves the world. A mesh that reflects too, emits by an image,
 //! or has cut-outs stays, and the scene makes lights of its faces. A sphere by an image or with cut-outs casts no light.
 
-use super::framing;
+use super::framing::Middle;
 use super::lamps::cover;
 use crate::math::Rgb;
 use crate::scene::{Light, Material, QuadLight, SphereLight, World};
@@ -54,9 +54,7 @@ impl Note {
 
 /// About the most irradiance that the emitting meshes of `world` send to its middle.
 pub(super) fn irradiance(world: &World) -> f64 {
-    let bounds = framing::bounds(world);
-    let middle = bounds.centre();
-    let nearest = 0.25 * (bounds.max - bounds.min).length();
+    let middle = Middle::of(world);
     let emission = |material: &Material| {
         let mean = material.emission_map.map(|map| &world.textures[map.image as usize]);
         let mean = mean.and_then(|image| image.levels().last());
@@ -71,8 +69,7 @@ pub(super) fn irradiance(world: &World) -> f64 {
         let sent = mesh.triangles.iter().map(|triangle| {
             let [a, b, c] = triangle.map(|corner| mesh.positions[corner as usize]);
             let area = 0.5 * (b - a).cross(c - a).length();
-            let distance = ((a + b + c) / 3.0 - middle).length().max(nearest);
-            area / (distance * distance)
+            area * middle.falloff((a + b + c) / 3.0)
         });
         sum += radiance * sent.sum::<f64>();
     }

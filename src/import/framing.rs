@@ -34,6 +34,26 @@ pub(super) fn bounds(world: &World) -> Bounds3 {
     bounds
 }
 
+/// The middle of a world, and how far from it a light counts as.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Middle {
+    centre: DVec3,
+    nearest: f64,
+}
+
+impl Middle {
+    pub fn of(world: &World) -> Self {
+        let bounds = bounds(world);
+        Self { centre: bounds.centre(), nearest: 0.25 * (bounds.max - bounds.min).length() }
+    }
+
+    /// About 1 over the squared distance of `place`: what is nearer than half a radius of the world counts as that far.
+    pub fn falloff(&self, place: DVec3) -> f64 {
+        let distance = place.distance(self.centre).max(self.nearest);
+        1.0 / (distance * distance)
+    }
+}
+
 /// `(target, eye)` of an orbit about `axis` (unit) that shows all of `world` in every frame.
 ///
 /// The eye of the first frame is towards +z (towards -y where the axis is z) and `elevation`

@@ -61,7 +61,10 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Loaded> {
     }
     // What glows is no reason to leave out the lamp.
     let own_lights = has_lamps || !world.lights.is_empty();
-    let glow = emission::irradiance(&world);
+    let glow = match &camera {
+        Some(_) if !own_lights => emission::irradiance(&world),
+        _ => 0.0,
+    };
     for note in emission::adopt(&mut world, 0, 0) {
         warnings.push(Diagnostic::new(path, note.message()).help(note.help()));
     }

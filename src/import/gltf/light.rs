@@ -4,7 +4,7 @@ use super::document::Document;
 use super::json::Json;
 use crate::error::{Diagnostic, Result};
 use crate::import::emission::DIM;
-use crate::import::framing;
+use crate::import::framing::Middle;
 use crate::import::source::Notes;
 use crate::math::{DAffine3, DVec3, Rgb};
 use crate::scene::{DirectionalLight, Light, PointLight, SpotLight, World};
@@ -70,12 +70,9 @@ pub(super) fn brighten(world: &mut World, path: &Path) -> Option<Diagnostic> {
     if world.lights.is_empty() || world.meshes.is_empty() {
         return None;
     }
-    let bounds = framing::bounds(world);
-    let middle = bounds.centre();
-    let nearest = 0.25 * (bounds.max - bounds.min).length();
+    let middle = Middle::of(world);
     let from = |place: DVec3, intensity: Rgb| {
-        let distance = place.distance(middle).max(nearest);
-        f64::from(intensity.max_element()) / (distance * distance)
+        f64::from(intensity.max_element()) * middle.falloff(place)
     };
     let irradiance = |light: &Light| match light {
         Light::Point(light) => from(light.position, light.intensity),

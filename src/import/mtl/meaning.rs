@@ -65,7 +65,6 @@ pub(super) fn of(source: &Source, mtl: &tobj::Material) -> (Material, Vec<String
     if is_principled {
         out.diffuse = out.diffuse.min(Rgb::ONE);
         cover(&mut out, source, mtl);
-        return (out, notes);
     }
     (out, notes)
 }

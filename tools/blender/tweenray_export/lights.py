@@ -22,7 +22,7 @@ def export(ob, matrix, materials, report):
     The triangles are (corners in Blender's axes, radiance): an ellipse, which tweenray has no light for.
     """
     light, name = ob.data, ob.name
-    power = [c * strength(light, materials, report, name) for c in colour(light)]
+    power = [c * f for c, f in zip(colour(light), strength(light, materials, report, name))]
     if max(power) <= 0.0:
         return [], None
     if min(power) < 0.0:
@@ -53,15 +53,15 @@ def colour(light):
 
 
 def strength(light, materials, report, name):
-    """Its power, with exposure and an emission node of constant strength."""
-    power = light.energy * 2.0 ** getattr(light, "exposure", 0.0)
+    """Its power by channel, with exposure and a constant emission node."""
+    factors = [1.0] * 3
     if light.use_nodes and light.node_tree is not None:
-        factor = materials.light_factor(light.node_tree, name)
-        if factor is None:
+        of_nodes = materials.light_factors(light.node_tree, name)
+        if of_nodes is None:
             report.add(name, "nodes of the light", "its power and colour alone")
         else:
-            power *= factor
-    return power
+            factors = of_nodes
+    return [light.energy * 2.0 ** getattr(light, "exposure", 0.0) * factor for factor in factors]
 
 
 def note(ob, light, report, name):

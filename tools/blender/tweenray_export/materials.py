@@ -34,19 +34,8 @@ class Materials:
         """{name: table} of the materials that are used."""
         return {name: made.table for name, made in self._made.items() if name in used}
 
-    def light_factor(self, tree, name):
-        """The factor that a light's nodes put on the brightest channel of its power; None where they are more than a constant
-        emission. `light_tint` has the other channels."""
-        rgb = self._light_emission(tree, name)
-        return None if rgb is None else max(rgb)
-
-    def light_tint(self, light, name):
-        """The colour of the emission of a light's nodes, of which the brightest channel is 1."""
-        rgb = self._light_emission(light.node_tree, name) if light.use_nodes and light.node_tree is not None else None
-        return [c / max(rgb) for c in rgb] if rgb and max(rgb) > 0.0 else [1.0] * 3
-
-    def _light_emission(self, tree, name):
-        """Radiance of the constant emission that a light's nodes are, as a factor of its power, or None."""
+    def light_factors(self, tree, name):
+        """The factors that a light's nodes put on the channels of its power; None where they are more than a constant emission."""
         out = tree.get_output_node("CYCLES")
         fed = out and Place(out.inputs["Surface"]).fed()
         if not fed or fed.kind != "EMISSION":

@@ -214,10 +214,9 @@ class Export:
         if linking.receiver_collection is not None or linking.blocker_collection is not None:
             self.report.add(ob.name, "light linking", "it lights everything")
         entries, quads = lights.export(ob, matrix, self.materials, self.report)
-        tint = self.materials.light_tint(ob.data, ob.name)
-        self.lamps.extend({kind: tinted(entry, tint) for kind, entry in lamp.items()} for lamp in entries)
+        self.lamps.extend(entries)
         if quads is not None:
-            corners, radiance = quads[0], product(quads[1], tint)
+            corners, radiance = quads
             name = f"ellipse {ob.name}"
             file = self.meshes.quads(name, corners)
             identity = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]]
@@ -326,16 +325,6 @@ def camera_text(records):
     return text
 
 
-def tinted(entry, tint):
-    """A light's entry whose light is multiplied by the colour `tint`."""
-    return {key: product(value, tint) if key in ("radiance", "intensity", "irradiance") else value for key, value in entry.items()}
-
-
-def product(a, b):
-    """Two colours, channel by channel."""
-    return [x * y for x, y in zip(a, b)]
-
-
 def strips(scene):
     """The strips of the scene's video sequencer."""
     editor = scene.sequence_editor
@@ -396,14 +385,14 @@ def form(ob):
         return 0, box
     mesh = ob.data
     points = floats(mesh.vertices, "co", len(mesh.vertices), 3)
-    parts = [box, chosen(points)]
+    parts = [box, thinned(points)]
     layer = next((layer for layer in mesh.uv_layers if layer.active_render), None)
     if layer is not None:
-        parts.append(chosen(floats(layer.uv, "vector", len(layer.uv), 2)))
+        parts.append(thinned(floats(layer.uv, "vector", len(layer.uv), 2)))
     return len(points) + len(mesh.loops), np.concatenate(parts, dtype=np.float32)
 
 
-def chosen(rows):
+def thinned(rows):
     """The numbers of at most `MOST_POINTS` rows at even distances."""
     return rows[:: 1 + len(rows) // MOST_POINTS].reshape(-1)
 
