@@ -71,9 +71,8 @@ pub(super) fn brighten(world: &mut World, path: &Path) -> Option<Diagnostic> {
         return None;
     }
     let middle = Middle::of(world);
-    let from = |place: DVec3, intensity: Rgb| {
-        f64::from(intensity.max_element()) * middle.falloff(place)
-    };
+    let from =
+        |place: DVec3, intensity: Rgb| f64::from(intensity.max_element()) * middle.falloff(place);
     let irradiance = |light: &Light| match light {
         Light::Point(light) => from(light.position, light.intensity),
         Light::Spot(light) => from(light.position, light.intensity),
