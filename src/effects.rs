@@ -34,6 +34,8 @@ pub struct EffectPlan {
     pub environment: bool,
     /// Light goes straight through glass, to diffuse surfaces and fog, and of lights without a surface to glossy ones.
     pub glass_shadows: bool,
+    /// Some of that glass gives light another colour.
+    pub coloured_shadows: bool,
     /// A medium between the surfaces takes light from rays and scatters some towards them.
     pub fog: bool,
     /// A ray-free ambient term is added.
@@ -90,6 +92,7 @@ impl EffectPlan {
         sky_light: true,
         environment: true,
         glass_shadows: true,
+        coloured_shadows: true,
         fog: true,
         ambient: true,
     };
@@ -126,6 +129,7 @@ impl EffectPlan {
         // Glossy surfaces see a sky of one colour by their own rays.
         let lit_by_sky = diffuse || (lit && environment.is_some()) || scatters;
         let is_straight = settings.glass_shadows == GlassShadows::Straight;
+        let is_through = used.glass > 0 && is_straight && (lit || lit_by_sky);
         let none_lit = || "no diffuse or glossy surface to light".to_string();
         let plan = Self {
             mirror: decide(
@@ -233,13 +237,18 @@ impl EffectPlan {
             ),
             glass_shadows: decide(
                 "light through glass",
-                used.glass > 0 && is_straight && (lit || lit_by_sky),
+                is_through,
                 format!(
-                    "{} in use, glass shadows are {}",
+                    "{} in use{}, glass shadows are {}",
                     counted(used.glass, "glass material"),
+                    match used.coloured_glass {
+                        0 => String::new(),
+                        coloured => format!(" ({coloured} coloured)"),
+                    },
                     if is_straight { "straight" } else { "opaque" }
                 ),
             ),
+            coloured_shadows: is_through && used.coloured_glass > 0,
             fog: decide(
                 "fog",
                 fog.is_some(),
@@ -398,6 +407,7 @@ struct UsedMaterials {
     coated: usize,
     part_glass: usize,
     glass: usize,
+    coloured_glass: usize,
     thin: usize,
     ranked: usize,
     absorbing: usize,
@@ -435,6 +445,7 @@ impl UsedMaterials {
             let is_clear = material.fresnel.is_some_and(|fresnel| fresnel.transmission != 0.0);
             counts.part_glass += usize::from(is_clear);
             counts.glass += usize::from(material.glass.is_some());
+            counts.coloured_glass += usize::from(material.colours_light());
             let glass =
                 |is: fn(&Glass) -> bool| usize::from(material.glass.as_ref().is_some_and(is));
             counts.thin += glass(|glass| glass.thin);

@@ -5,7 +5,7 @@
 //! comes from; `reuse` answers and never traces. All in scene space.
 
 use crate::film::Provenance;
-use crate::math::{DVec3, Vec3};
+use crate::math::{DVec3, Rgb, Vec3};
 use crate::scene::{LightCells, Scene};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -243,16 +243,24 @@ pub trait Inference: Sync {
 /// Which light a channel of ratios belongs to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Channel {
-    /// The area light of this index.
-    Area(u32),
-    /// One of the lights with an extent that matter at a point, where lights are selected: another one at every
-    /// point.
-    Selected(u32),
+    /// The area light of this index, or the part of it of one primary colour ([`Channels::colours`]).
+    Area(u32, u32),
+    /// One of the lights with an extent that matter at a point, where lights are selected, or the part of it of one primary
+    /// colour: another light at every point.
+    Selected(u32, u32),
     /// The part of this number of the light that samples choose, where lights are selected. The parts differ in
     /// colour.
     Tail(u32),
-    /// The part of this number of the sky: one, but for an environment of several colours.
+    /// The part of this number of the sky: one, but for an environment of several colours and behind coloured glass.
     Sky(u32),
+}
+
+/// The primary colours, of which three ratios of a light are kept.
+pub const PRIMARIES: [Rgb; 3] = [Rgb::X, Rgb::Y, Rgb::Z];
+
+/// The colours that `channels` ratios of a light are of, which has the colours `own` where no glass colours it.
+pub fn tints(own: &[Rgb], channels: usize) -> &[Rgb] {
+    own.get(..channels).unwrap_or(&PRIMARIES)
 }
 
 /// The lights whose ratios are kept.
@@ -267,38 +275,46 @@ pub struct Channels {
     sky: std::ops::Range<usize>,
     slots: usize,
     tail: usize,
+    colours: usize,
 }
 
 impl Channels {
-    /// Channels for those lights of `scene` that `is_kept` keeps. Where `cells` select lights, a point has channels
-    /// for as many as matter at most.
+    /// Channels for those lights of `scene` that `is_kept` keeps, three for each where light `is_coloured` by glass on its
+    /// way. Where `cells` select lights, a point has channels for as many as matter at most.
     pub fn of(
         scene: &Scene,
         cells: Option<&LightCells>,
+        is_coloured: bool,
         is_kept: impl Fn(Channel) -> bool,
     ) -> Self {
-        let mut channels = Self { of_light: vec![None; scene.lights.len()], ..Self::default() };
+        let colours = if is_coloured { PRIMARIES.len() } else { 1 };
+        let of_light = vec![None; scene.lights.len()];
+        let mut channels = Self { of_light, colours, ..Self::default() };
+        let parts = 0..colours as u32;
         if let Some(cells) = cells {
-            let slots = (0..cells.most_area() as u32).map(Channel::Selected);
+            let slots = 0..cells.most_area() as u32;
+            let slots =
+                slots.flat_map(|slot| parts.clone().map(move |k| Channel::Selected(slot, k)));
             channels.list.extend(slots.filter(|channel| is_kept(*channel)));
             channels.slots = channels.list.len();
             if channels.slots > 0 {
-                let parts = (0..cells.tints().len() as u32).map(Channel::Tail);
+                let tints = cells.tints().len().max(colours);
+                let parts = (0..tints as u32).map(Channel::Tail);
                 channels.list.extend(parts.filter(|channel| is_kept(*channel)));
                 channels.tail = channels.list.len() - channels.slots;
             }
         }
         let lights = if cells.is_some() { &[] } else { &scene.lights[..] };
         for (index, light) in lights.iter().enumerate() {
-            let channel = Channel::Area(index as u32);
-            if light.is_area() && is_kept(channel) {
+            let of_part = |part| Channel::Area(index as u32, part);
+            if light.is_area() && is_kept(of_part(0)) {
                 channels.of_light[index] = Some(channels.list.len());
-                channels.list.push(channel);
+                channels.list.extend(parts.clone().map(of_part));
             }
         }
         let first = channels.list.len();
-        let colours = scene.environment.as_ref().map_or(1, |sky| sky.radiance.tints().len());
-        let parts = (0..colours as u32).map(Channel::Sky);
+        let tints = scene.environment.as_ref().map_or(1, |sky| sky.radiance.tints().len());
+        let parts = (0..tints.max(colours) as u32).map(Channel::Sky);
         channels.list.extend(parts.filter(|channel| is_kept(*channel)));
         channels.sky = first..channels.list.len();
         channels
@@ -319,7 +335,12 @@ impl Channels {
         self.list.iter().copied()
     }
 
-    /// The channel of light `index`, if its ratio is kept.
+    /// How many ratios are kept of a light: one, or three where glass may colour it on its way.
+    pub fn colours(&self) -> usize {
+        self.colours.max(1)
+    }
+
+    /// The channel of light `index`, or the first of them, if its ratio is kept.
     pub fn of_light(&self, index: u32) -> Option<usize> {
         self.of_light.get(index as usize).copied().flatten()
     }
@@ -335,7 +356,7 @@ impl Channels {
         self.slots..self.slots + self.tail
     }
 
-    /// The sky's channels, if its ratios are kept: one, but for an environment of several colours.
+    /// The sky's channels, if its ratios are kept: one, but for an environment of several colours and behind coloured glass.
     pub fn sky(&self) -> std::ops::Range<usize> {
         self.sky.clone()
     }

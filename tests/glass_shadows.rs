@@ -3,17 +3,20 @@
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "shows what it measured")]
 
 mod common;
+#[path = "common/moves.rs"]
+mod moves;
 
-use common::{Job, cube, plate, pose, quad, render, render_scene};
+use common::{Job, cube, plate, pose, quad, render, render_scene, uv_sphere};
+use moves::{Set, codes};
 use std::f64::consts::PI;
 use tweenray::math::{Bounds3, DVec3, Rgb};
 use tweenray::scene::{
-    Camera, DirectionalLight, Environment, EnvironmentKind, Fog, Glass, GlassShadows,
-    IntersectorKind, Light, Material, PointLight, QuadLight, Settings, SkyGradient, World,
-    WorldSphere,
+    Camera, CameraPath, DirectionalLight, Environment, EnvironmentKind, Fog, Glass, GlassShadows,
+    IntersectorKind, KeyPose, Light, Material, PointLight, QuadLight, Settings, Shot, SkyGradient,
+    World, WorldSphere,
 };
 use tweenray::shade::optics;
-use tweenray::stats::RayKind;
+use tweenray::stats::{RayKind, ReuseCounts};
 
 const TINT: Rgb = Rgb::new(0.9, 0.5, 0.2);
 
@@ -201,4 +204,61 @@ fn fog_is_lit_through_glass() {
     };
     let share = lit(Some(TINT)) / lit(None);
     close(share, TINT * (1.0 - optics::pane_reflectance(1.0, 1.5)) as f32, 1e-4);
+}
+
+/// A white floor under panes of red and clear glass, past which a camera moves.
+fn below_panes(lights: Vec<Light>, sky: Rgb, environment: Option<Environment>) -> Set {
+    let mut world = plate(Material::diffuse("white", Rgb::splat(0.6)), 6.0);
+    let red = world.add_material(pane(Rgb::new(1.0, 0.02, 0.02)));
+    for x in [-2.4, -1.2, 0.0, 1.2, 2.4] {
+        let [west, east] = [x - 0.4, x + 0.4];
+        let corners = [[west, 0.4], [east, 0.4], [east, -0.4], [west, -0.4]];
+        world.meshes.push(quad(corners.map(|[x, z]| DVec3::new(x, 1.5, z)), red));
+    }
+    // Out of sight, so that a shadow ray counts as dear enough to be saved.
+    let mut ball = uv_sphere(600, 400);
+    ball.positions.iter_mut().for_each(|p| p.y -= 9.0);
+    world.meshes.push(ball);
+    (world.lights, world.sky.radiance, world.environment) = (lights, sky, environment);
+    let key = |at: f64, x: f64| KeyPose { at, pose: pose((x, 1.2, 4.0), (x, 0.0, 0.0)) };
+    Set::of(world, Shot::new(CameraPath::Keys(vec![key(0.0, -0.2), key(1.0, 0.2)]), 9, 40.0))
+}
+
+#[test]
+fn inferred_light_has_the_colour_that_glass_gives_it() {
+    let lamp = |x: f64, half: f64, strength: f32| {
+        let corners = [[-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0], [1.0, 1.0]]
+            .map(|[u, v]| DVec3::new(x + half * u, 3.0, half * v));
+        Light::Quad(QuadLight { corners, radiance: Rgb::splat(strength), two_sided: true })
+    };
+    let many = (0..24).map(|k| lamp(-4.6 + 0.4 * f64::from(k), 0.1, 12.0)).collect();
+    let grey = Rgb::splat(0.5);
+    let gradient = SkyGradient { zenith: grey, horizon: 0.5 * grey, ground: Rgb::ZERO };
+    let gradient = Environment::new(EnvironmentKind::Gradient(gradient));
+    let sets = [
+        ("lamp", below_panes(vec![lamp(0.0, 0.8, 5.0)], Rgb::ZERO, None)),
+        ("sky", below_panes(vec![], grey, None)),
+        ("lamps", below_panes(many, Rgb::ZERO, None)),
+        ("gradient", below_panes(vec![], Rgb::ZERO, Some(gradient))),
+    ];
+    for (name, set) in sets {
+        let own = set.settings((96, 64), 1, 16);
+        let settings = Settings { glass_shadows: GlassShadows::Straight, ..own };
+        let stage = set.stage(2);
+        let frames: Vec<u32> = (1..=9).collect();
+        let made = stage.frames(&settings, &set.shot, &frames);
+        let (mut error, mut counts) = (DVec3::ZERO, ReuseCounts::default());
+        for (frame, made) in frames.iter().zip(&made) {
+            counts += made.reuse;
+            let truth = stage.converged(&settings, &set.shot, *frame, 256);
+            let [own, truth] = [&made.film, &truth].map(|film| codes(&settings, film));
+            let pixels = own.len() as f64 / 255.0;
+            let off = own.iter().zip(&truth).map(|(a, b)| DVec3::from(*a) - DVec3::from(*b));
+            error += off.sum::<DVec3>() / pixels / frames.len() as f64;
+        }
+        let inferred = counts.direct_inferred as f64 / counts.direct as f64;
+        println!("{name}: {error:.3} of 255, {inferred:.2} inferred");
+        assert!(inferred > 0.2, "{name}: {inferred}");
+        assert!(error.abs().max_element() < 0.1, "{name}: {error}");
+    }
 }

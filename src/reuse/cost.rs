@@ -40,7 +40,7 @@ fn is_worth(scene: &Scene, rays: u32) -> bool {
 /// may stop after pilot rays.
 pub fn rays_of(channel: Channel, settings: &Settings) -> u32 {
     match channel {
-        Channel::Area(_) | Channel::Selected(_) | Channel::Tail(_) => settings.shadow_samples,
+        Channel::Area(..) | Channel::Selected(..) | Channel::Tail(_) => settings.shadow_samples,
         Channel::Sky(_) => settings.sky_samples,
     }
 }
@@ -53,7 +53,7 @@ const DISPUTED: f64 = 0.25;
 fn expected_rays(channel: Channel, settings: &Settings) -> u32 {
     let all = rays_of(channel, settings);
     match channel {
-        Channel::Area(_) | Channel::Selected(_) => match settings.least_shadow_samples {
+        Channel::Area(..) | Channel::Selected(..) => match settings.least_shadow_samples {
             Some(pilots) => (pilots + (DISPUTED * f64::from(all)) as u32).min(all),
             None => all,
         },
@@ -66,9 +66,9 @@ fn expected_rays(channel: Channel, settings: &Settings) -> u32 {
 pub fn channels(scene: &Scene, settings: &Settings) -> Channels {
     let plan = EffectPlan::of(scene, settings);
     let cells = scene.selected_lights(settings);
-    let kept = Channels::of(scene, cells, |channel| {
+    let kept = Channels::of(scene, cells, plan.coloured_shadows, |channel| {
         let runs = match channel {
-            Channel::Area(_) | Channel::Selected(_) | Channel::Tail(_) => plan.area_lights,
+            Channel::Area(..) | Channel::Selected(..) | Channel::Tail(_) => plan.area_lights,
             Channel::Sky(_) => plan.sky_light,
         };
         // The camera samples of a pixel share one lookup.
@@ -79,7 +79,7 @@ pub fn channels(scene: &Scene, settings: &Settings) -> Channels {
     if cost.traced > cost.checked + cost.lookup {
         kept
     } else {
-        Channels::of(scene, cells, |_| false)
+        Channels::of(scene, cells, false, |_| false)
     }
 }
 
@@ -109,7 +109,7 @@ pub fn lookup_reasons(scene: &Scene, settings: &Settings) -> Vec<LookupReason> {
         // Too many to list: they differ by nothing that decides.
         let (soft, hard): (Vec<_>, Vec<_>) = scene.lights.iter().partition(|l| l.is_area());
         let looked_up = kept.slots() > 0;
-        let soft = (soft.len(), "area light", looked_up, area(Channel::Selected(0), looked_up));
+        let soft = (soft.len(), "area light", looked_up, area(Channel::Selected(0, 0), looked_up));
         for (count, kind, looked_up, why) in [soft, (hard.len(), "delta light", false, delta())] {
             if count > 0 {
                 reasons.push(LookupReason { light: counted(count, kind), looked_up, why });
@@ -117,7 +117,7 @@ pub fn lookup_reasons(scene: &Scene, settings: &Settings) -> Vec<LookupReason> {
         }
     } else {
         for (index, light) in scene.lights.iter().enumerate() {
-            let channel = light.is_area().then_some(Channel::Area(index as u32));
+            let channel = light.is_area().then_some(Channel::Area(index as u32, 0));
             let looked_up = kept.of_light(index as u32).is_some();
             let why = channel.map_or_else(delta, |channel| area(channel, looked_up));
             let light = format!("light {}, {}", index + 1, light.name());
@@ -193,18 +193,21 @@ impl PointCost {
         let MeanLights { area, tail_samples, .. } = mean;
         // Few points have as many lights as they have channels for.
         let share = |channel| match channel {
-            Channel::Selected(_) => area / channels.slots() as f64,
+            Channel::Selected(..) => area / channels.slots() as f64,
             // All parts have the same rays.
             Channel::Tail(_) => tail_samples / channels.tail().len() as f64,
             Channel::Sky(_) => 1.0 / channels.sky().len() as f64,
-            Channel::Area(_) => 1.0,
+            Channel::Area(..) => 1.0 / channels.colours() as f64,
         };
         let sum = |of: &dyn Fn(Channel) -> u32| -> f64 {
             channels.iter().map(|channel| share(channel) * f64::from(of(channel))).sum()
         };
         let traced = |channel| samples.saturating_mul(expected_rays(channel, settings));
         // As if all lights were as bright.
-        let lights = if channels.slots() > 0 { area } else { channels.len() as f64 };
+        let lights = match channels.slots() {
+            0 => (channels.len() / channels.colours()) as f64,
+            _ => area,
+        };
         let checked = |channel| {
             let saved = samples.saturating_mul(rays_of(channel, settings));
             check_rays(saved, 1.0 / lights.max(1.0) as f32)

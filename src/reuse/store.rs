@@ -55,6 +55,9 @@ pub struct Compatibility {
     pub selected: bool,
 }
 
+/// Names of the primary colours.
+const COLOURS: [&str; 3] = ["red", "green", "blue"];
+
 /// The head of a record.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct Head {
@@ -71,8 +74,16 @@ impl Compatibility {
     /// The compatibility of references of a job, by the hash of its `world`, its `channels` and its samples.
     pub fn of(world: &str, channels: &Channels, settings: &Settings) -> Self {
         let name = |channel| match channel {
-            Channel::Area(index) => format!("light {}", index + 1),
-            Channel::Selected(index) => format!("selected light {}", index + 1),
+            Channel::Area(index, _) if channels.colours() == 1 => format!("light {}", index + 1),
+            Channel::Area(index, part) => {
+                format!("light {}, {}", index + 1, COLOURS[part as usize])
+            }
+            Channel::Selected(slot, _) if channels.colours() == 1 => {
+                format!("selected light {}", slot + 1)
+            }
+            Channel::Selected(slot, part) => {
+                format!("selected light {}, {}", slot + 1, COLOURS[part as usize])
+            }
             // How many lights are too weak to count depends on the exposure.
             Channel::Tail(part) => {
                 format!("part {} of the weak lights, exposure {}", part + 1, settings.exposure)

@@ -197,6 +197,17 @@ impl Material {
         self.diffuse != Rgb::ZERO && !self.fresnel.as_ref().is_some_and(is_clear)
     }
 
+    /// Whether glass gives light that goes through it another colour.
+    pub fn colours_light(&self) -> bool {
+        let is_grey = |colour: Rgb| colour == Rgb::splat(colour.x);
+        let is_painted = self.texture.is_some() || self.vertex_colours;
+        self.glass.is_some_and(|glass| {
+            !is_grey(glass.tint)
+                || !is_grey(glass.absorption)
+                || self.fresnel.is_some() && is_painted
+        })
+    }
+
     /// Whether any of the surface is a mirror, perfect or rough, or glass beside other layers.
     pub fn is_mirror(&self) -> bool {
         let any = |f: Fresnel| [f.grazing, f.metallic, f.clearcoat, f.transmission] != [0.0; 4];

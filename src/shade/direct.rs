@@ -14,6 +14,7 @@ use super::selection::{LightUser, LightUsers, Reached, TailSamples};
 use super::sky_samples::EnvironmentScratch;
 use super::source::LightSource;
 use super::{FrameInput, Renderer, Reuse, dimensions, optics};
+use crate::inference;
 use crate::intersect::{Hit, Ray, SpawnPoint, SurfaceInteraction, lift_to_smooth};
 use crate::math::{DVec3, Rgb, luminance};
 use crate::scene::{Scene, Settings};
@@ -109,6 +110,8 @@ pub(super) struct ShadowScratch {
     going: Vec<u32>,
     /// Channels of a shading point.
     channels: usize,
+    /// Channels of a light, one after another: one, or one for each primary colour.
+    colours: usize,
     /// Where each light is traced, if lights are selected.
     pub users: LightUsers,
     /// Samples of the tail.
@@ -169,12 +172,10 @@ struct Gathered {
     tinted: Rgb,
 }
 
-impl Gathered {
-    /// Colour of what arrives, of mean 1.
-    fn tint(&self) -> Rgb {
-        let sum = self.tinted.element_sum();
-        if sum > 0.0 { self.tinted * (3.0 / sum) } else { Rgb::ONE }
-    }
+/// The colour, of mean 1, of light of which these weights arrive through glass, by [`ShadowScratch::tinted`].
+fn tint(tinted: Rgb) -> Rgb {
+    let sum = tinted.element_sum();
+    if sum > 0.0 { tinted * (3.0 / sum) } else { Rgb::ONE }
 }
 
 impl ShadowScratch {
@@ -214,6 +215,16 @@ impl ShadowScratch {
     /// Irradiance without shadows in a channel of a shading point, by the place of both.
     pub fn exact(&self, at: usize) -> f64 {
         self.exact[at]
+    }
+
+    /// The ratio that is known of the light whose channels start at `channel`, for shading point `i`; NaN where any of
+    /// its colours is unknown.
+    fn known(&self, i: usize, channel: usize) -> Rgb {
+        let of = |k: usize| self.groups.known(i, channel + k, self.channels);
+        match self.colours {
+            1 => Rgb::splat(of(0)),
+            _ => Rgb::new(of(0), of(1), of(2)),
+        }
     }
 
     /// Notes it, and what of it the pixel would show.
@@ -346,6 +357,7 @@ impl Renderer<'_> {
         scratch.starts.resize(lit.len(), None);
         if let Some(reuse) = &input.reuse {
             scratch.channels = reuse.channels.len();
+            scratch.colours = reuse.channels.colours();
             scratch.groups.gather_points(input, reuse.channels, lit);
         }
         let mut users = std::mem::take(&mut scratch.users);
@@ -408,10 +420,13 @@ impl Renderer<'_> {
                 let Some(slot) = slot else { continue };
                 let point = &lit[i as usize];
                 let exact = point.unshadowed(&source.sampler);
-                let shown = luminance(point.weight * source.sampler.emission) * exact as f32;
+                let sent = point.weight * source.sampler.emission;
                 let own = i as usize * channels + usize::from(slot);
-                s.exact[own] = exact;
-                s.shown[own] = shown * self.settings.exposure;
+                for (k, tint) in tints(s.colours).iter().enumerate() {
+                    s.exact[own + k] = exact;
+                    let shown = luminance(sent * *tint) * exact as f32;
+                    s.shown[own + k] = shown * self.settings.exposure;
+                }
             }
             if let Some(fog) = self.fog().filter(|_| !source.is_sky()) {
                 for LightUser { point: i, slot } in input.reached(at, lit.len(), users).iter() {
@@ -419,8 +434,10 @@ impl Renderer<'_> {
                     let own = i as usize * channels + usize::from(slot);
                     if s.exact[own] != 0.0 {
                         let left = fog::dimmed(fog, source, &lit[i as usize]);
-                        s.exact[own] *= left;
-                        s.shown[own] *= left as f32;
+                        for at in own..own + s.colours {
+                            s.exact[at] *= left;
+                            s.shown[at] *= left as f32;
+                        }
                     }
                 }
             }
@@ -481,12 +498,12 @@ impl Renderer<'_> {
         self.cast((source, &Run::whole(source)), (lit, &wanted, &going), pixels, s, counts);
         for (&LightUser { point: i, slot }, gathered) in wanted.iter().zip(&s.gathered) {
             let point = &lit[i as usize];
-            let Gathered { exact, open, all, rays, tinted: _ } = *gathered;
-            let tint = gathered.tint();
+            let Gathered { exact, open, all, rays, tinted } = *gathered;
+            let tint = tint(tinted);
             if let (Some(slot), true) = (slot, rays > 0) {
-                // One ratio says nothing of a light that comes in another colour.
-                let kept = if is_grey(tint) { open } else { f64::NAN };
-                s.groups.add(i as usize, usize::from(slot), s.channels, kept, all);
+                for (channel, open) in (usize::from(slot)..).zip(parts(open, tint, s.colours)) {
+                    s.groups.add(i as usize, channel, s.channels, open, all);
+                }
             }
             if open > 0.0 {
                 let unshadowed = source.sampler.emission * exact as f32;
@@ -590,7 +607,7 @@ impl Renderer<'_> {
             for LightUser { point: i, slot } in reached.iter() {
                 let point = &lit[i as usize];
                 let wanted = slot.map(usize::from).and_then(|slot| {
-                    let own = slot..slot + 1;
+                    let own = slot..slot + s.colours;
                     let wanted = s.groups.check_rays(i as usize, own, channels, source.samples);
                     wanted.filter(|_| s.exact[i as usize * channels + slot] != 0.0)
                 });
@@ -614,11 +631,18 @@ impl Renderer<'_> {
             let mut start = 0;
             for (LightUser { point: i, slot }, &end) in reached.iter().zip(&s.ends) {
                 let (open, weight) = opened(source, s, start..end);
+                let tint = tint(s.tinted(start..end));
                 let rays = end - start;
                 start = end;
                 if let (Some(slot), true) = (slot, rays > 0) {
-                    let at = (usize::from(slot), channels);
-                    s.groups.note_checked(i as usize, at, (open, weight), rays);
+                    for (channel, open) in (usize::from(slot)..).zip(parts(open, tint, s.colours)) {
+                        s.groups.note_checked(
+                            i as usize,
+                            (channel, channels),
+                            (open, weight),
+                            rays,
+                        );
+                    }
                 }
             }
         }
@@ -660,11 +684,11 @@ impl Renderer<'_> {
                 continue;
             }
             s.groups.note_lit(i);
-            let ratio = s.groups.known(i, channel, channels);
+            let ratio = s.known(i, channel);
             if ratio.is_nan() {
                 wanted.push(user);
             } else {
-                pixels.note_ratio(at, point.place.pixel, ratio);
+                pixels.note_ratio(at, point.place.pixel, ratio.element_sum() / 3.0);
                 let light = point.weight * source.sampler.emission * (exact as f32 * ratio);
                 pixels.add(point.place.pixel, point.place.sample, light);
             }
@@ -756,9 +780,15 @@ impl Renderer<'_> {
     }
 }
 
-/// Whether a colour of mean 1 is no other than white, as far as a display shows.
-fn is_grey(tint: Rgb) -> bool {
-    (tint - Rgb::ONE).abs().max_element() < 1e-3
+/// The colours that the ratios of a light are of, if there are `colours`.
+fn tints(colours: usize) -> &'static [Rgb] {
+    inference::tints(&[Rgb::ONE], colours)
+}
+
+/// The parts of the weights `open` in each of so many `colours`, if all of them have the colour `tint`, of mean 1.
+fn parts(open: f64, tint: Rgb, colours: usize) -> impl Iterator<Item = f64> {
+    let part = move |own: f32| if colours == 1 { open } else { open * f64::from(own) };
+    tint.to_array().into_iter().take(colours).map(part)
 }
 
 /// Sums of the weights of those of the batch's `rays` to `source` that are not occluded, and of all.

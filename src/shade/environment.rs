@@ -16,6 +16,7 @@ use super::pixels::BlockPixels;
 use super::point::ShadingPoint;
 use super::sky_samples::FoundSky;
 use super::{Renderer, Reuse, normal_map};
+use crate::inference;
 use crate::math::{DVec3, Rgb, luminance};
 use crate::stats::{RayCounts, RayKind};
 use std::ops::Range;
@@ -62,7 +63,7 @@ impl EnvironmentSource<'_> {
 
     /// The colours that its ratios are kept of; none where none is kept.
     fn tints(&self) -> &[Rgb] {
-        &self.light.tints()[..self.channels.len()]
+        inference::tints(self.light.tints(), self.channels.len())
     }
 
     /// What arrives at a point where nothing is in the way.
@@ -80,7 +81,7 @@ impl EnvironmentSource<'_> {
     /// The channels of shading point `i`: their places among those of all points, and their colours.
     fn places(&self, i: usize) -> impl Iterator<Item = (usize, Rgb)> {
         let first = i * self.all_channels + self.channels.start;
-        (first..).zip(&self.light.tints()[..self.channels.len()]).map(|(at, tint)| (at, *tint))
+        (first..).zip(self.tints()).map(|(at, tint)| (at, *tint))
     }
 
     /// What arrives at shading point `i` if that is known, as it is where nothing can arrive; `None` where nothing is kept.
@@ -204,11 +205,6 @@ impl Renderer<'_> {
             pixels.add(point.place.pixel, point.place.sample, light);
             for (channel, (at, tint)) in source.channels.clone().zip(source.places(i)) {
                 let (open, all) = (part(found.open, tint), part(found.all, tint));
-                let open = if self.is_in_other_colour(found.open, source.tints()) {
-                    f64::NAN
-                } else {
-                    open
-                };
                 if s.exact(at) != 0.0 && all > 0.0 {
                     s.groups.note_lit(i);
                     s.groups.add(i, channel, source.all_channels, open, all);

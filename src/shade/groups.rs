@@ -157,6 +157,8 @@ pub(super) struct Groups {
     channels: usize,
     /// Those of selected lights, which come first.
     slots: usize,
+    /// And how many each light has.
+    colours: usize,
 }
 
 impl Groups {
@@ -221,16 +223,20 @@ impl Groups {
             }
         }
         self.slots = channels.slots();
+        self.colours = channels.colours();
         self.channels = channels.len();
     }
 
-    /// The channel of a light at the surface point of shading point `i`: the next free one if it has none yet. `None`
-    /// where all are taken, by lights of other cells.
+    /// The channel of a light at the surface point of shading point `i`, or the first of them: the next free one if it has
+    /// none yet. `None` where all are taken, by lights of other cells.
     pub fn slot(&mut self, i: u32, light: u32) -> Option<u16> {
         let first = self.of_lit[i as usize] as usize * self.channels;
         let own = &mut self.asked.lights[first..][..self.slots];
-        let at = own.iter().position(|other| *other == light || *other == NO_LIGHT)?;
-        own[at] = light;
+        // A number for each colour.
+        let first = light * self.colours as u32;
+        let is_own = |lights: &[u32]| lights[0] == first || lights[0] == NO_LIGHT;
+        let at = own.chunks_exact(self.colours).position(is_own)? * self.colours;
+        (first..).zip(&mut own[at..][..self.colours]).for_each(|(number, own)| *own = number);
         Some(at as u16)
     }
 

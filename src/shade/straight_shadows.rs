@@ -17,16 +17,6 @@ use crate::stats::{RayCounts, RayKind};
 const MOST_PASSED: usize = 64;
 
 impl Renderer<'_> {
-    /// Whether glass has given `light` a colour that is no sum of the `tints` which ratios are kept of.
-    pub(super) fn is_in_other_colour(&self, light: Rgb, tints: &[Rgb]) -> bool {
-        if !self.plan.glass_shadows {
-            return false;
-        }
-        let part = |tint: Rgb| tint * (light.dot(tint) / tint.length_squared());
-        let kept: Rgb = tints.iter().map(|tint| part(*tint)).sum();
-        (light - kept).abs().max_element() > 1e-3 * light.max_element()
-    }
-
     /// The part of light that arrives along a shadow ray that meets something: none if that is no glass, or `if_polished` and it is
     /// rough.
     pub(super) fn through_glass(

@@ -12,6 +12,7 @@ use super::point::{SamplePlace, ShadingPoint};
 use super::selection::{FoundLight, LightSelection, TailSamples};
 use super::source::LightSource;
 use super::{FrameInput, Renderer, Reuse, dimensions};
+use crate::inference;
 use crate::math::{Rgb, luminance};
 use crate::scene::Tail;
 use crate::stats::RayCounts;
@@ -53,7 +54,7 @@ impl<'a> TailChannels<'a> {
     /// `None` where no ratio of the tail is kept.
     fn of(reuse: &Reuse, selection: &'a LightSelection) -> Option<Self> {
         let Range { start: first, end } = reuse.channels.tail();
-        let tints = &selection.tints()[..end - first];
+        let tints = inference::tints(selection.tints(), end - first);
         (!tints.is_empty()).then_some(Self { first, tints, all: reuse.channels.len() })
     }
 
@@ -228,8 +229,6 @@ impl Renderer<'_> {
             let Some(channels) = channels else { continue };
             for (k, (at, tint)) in channels.places(i as usize).enumerate() {
                 let (open, all) = (part(irradiance, tint), s.exact(at));
-                let is_other = self.is_in_other_colour(irradiance, channels.tints);
-                let open = if is_other { f64::NAN } else { open };
                 if all != 0.0 {
                     s.groups.note_lit(i as usize);
                     s.groups.add(i as usize, channels.first + k, channels.all, open, all);
