@@ -2,9 +2,10 @@
 //! every machine decides alike.
 
 use super::evidence::{Evidence, Finding};
+use super::risk::is_direct;
 use crate::effects::EffectPlan;
 use crate::error::counted;
-use crate::inference::{Channel, Channels, SAMPLES_TOGETHER, check_rays};
+use crate::inference::{Channel, Channels, SAMPLES_TOGETHER, SurfacePoint, check_rays};
 use crate::scene::{MeanLights, Scene, Settings};
 use crate::stats::{RayCounts, RayKind};
 
@@ -75,7 +76,7 @@ pub fn channels(scene: &Scene, settings: &Settings) -> Channels {
         runs && plan.diffuse
             && is_worth(scene, expected_rays(channel, settings).saturating_mul(settings.spp))
     });
-    let cost = PointCost::of(scene, &kept, settings);
+    let cost = PointCost::of(scene, &kept, settings, settings.spp.min(SAMPLES_TOGETHER));
     if cost.traced > cost.checked + cost.lookup {
         kept
     } else {
@@ -176,7 +177,7 @@ pub fn of_frame(rays: &RayCounts, lookups: u64) -> f64 {
     of_rays.iter().sum::<f64>() + LOOKUP * lookups as f64
 }
 
-/// Costs of the light of one surface point, whose camera samples are shaded together.
+/// Costs of the light of one surface point.
 struct PointCost {
     /// Cost of tracing, in camera rays.
     traced: f64,
@@ -187,8 +188,8 @@ struct PointCost {
 }
 
 impl PointCost {
-    fn of(scene: &Scene, channels: &Channels, settings: &Settings) -> Self {
-        let samples = settings.spp.min(SAMPLES_TOGETHER);
+    /// The costs of a point for which this many camera `samples` stand, which are shaded together.
+    fn of(scene: &Scene, channels: &Channels, settings: &Settings, samples: u32) -> Self {
         let mean = scene.light_cells.as_ref().map(|cells| cells.mean()).unwrap_or_default();
         let MeanLights { area, tail_samples, .. } = mean;
         // Few points have as many lights as they have channels for.
@@ -220,20 +221,52 @@ impl PointCost {
     }
 }
 
-/// Whether lookups save more than they cost, by the `findings` of probes, if those estimates are used that
+/// The kinds of surface points that are looked up.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct LookupKinds {
+    /// Those that are seen directly.
+    pub direct: bool,
+    /// Those that are seen in mirrors and through glass.
+    pub specular: bool,
+}
+
+impl LookupKinds {
+    /// All of them.
+    pub const ALL: Self = Self { direct: true, specular: true };
+
+    /// Whether there is any.
+    pub fn any(self) -> bool {
+        self.direct || self.specular
+    }
+
+    /// Whether `point` is of one.
+    pub fn has(self, point: &SurfacePoint) -> bool {
+        if point.direct { self.direct } else { self.specular }
+    }
+}
+
+/// For which kinds of points lookups save more than they cost, by the `findings` of probes, if those estimates are used that
 /// `evidence` allows. A share `probed` of the points is probed, each of which is traced once more.
-pub fn is_worth_lookups<'f>(
+pub fn worth_lookups<'f>(
     evidence: &Evidence,
     findings: impl Iterator<Item = &'f Finding>,
     (scene, channels, settings): (&Scene, &Channels, &Settings),
     probed: f64,
-) -> bool {
-    let cost = PointCost::of(scene, channels, settings);
-    let saved = |finding: &Finding| match (evidence.may_use(finding.level, 1.0), finding.agreed) {
-        (true, true) => cost.traced - cost.checked,
-        (true, false) => -cost.checked,
-        (false, _) => 0.0,
-    };
-    let gain = |finding: &Finding| saved(finding) - probed * cost.traced - cost.lookup;
-    findings.map(gain).sum::<f64>() > 0.0
+) -> LookupKinds {
+    let samples = settings.spp.min(SAMPLES_TOGETHER);
+    let mut gains = [0.0; 2];
+    // In mirrors and glass each camera sample is a point of its own.
+    let costs = [samples, 1].map(|samples| PointCost::of(scene, channels, settings, samples));
+    for finding in findings {
+        let kind = usize::from(!is_direct(finding.level));
+        let cost = &costs[kind];
+        let saved = match (evidence.may_use(finding.level, 1.0), finding.agreed) {
+            (true, true) => cost.traced - cost.checked,
+            (true, false) => -cost.checked,
+            (false, _) => 0.0,
+        };
+        gains[kind] += saved - probed * cost.traced - cost.lookup;
+    }
+    let [direct, specular] = gains.map(|gain| gain > 0.0);
+    LookupKinds { direct, specular }
 }

@@ -39,6 +39,11 @@ pub struct Features {
     pub is_direct: bool,
 }
 
+/// Whether a level is of points that are seen directly.
+pub fn is_direct(level: u8) -> bool {
+    usize::from(level) < 2 * STEPS
+}
+
 impl Features {
     /// The level of risk, below [`LEVELS`].
     pub fn level(&self) -> u8 {

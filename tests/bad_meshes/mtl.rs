@@ -258,9 +258,23 @@ fn norm_is_a_normal_map_and_map_bump_only_if_it_looks_like_one() {
     };
     let found: Vec<_> = model.world.materials.iter().map(of).collect();
     assert_eq!(found, [Some((false, 1.0)), Some((true, 0.5)), None, Some((true, 1.0)), None]);
-    let [warning, colour] = &model.warnings[..] else { panic!("{:?}", model.warnings) };
+    let [doubt, warning, colour] = &model.warnings[..] else { panic!("{:?}", model.warnings) };
+    assert!(doubt.message.contains("grey.ppm of line 2: this does not look like"), "{doubt}");
     assert!(colour.message.contains("`map_Kd` blue.ppm: this looks like a normal map"), "{colour}");
     assert!(warning.message.contains("grey.ppm of line 6 holds heights"), "{warning}");
+}
+
+#[test]
+fn what_glass_has_no_place_for_is_named() {
+    let mtl = b"newmtl a\nKd .8 .6 .2\nPm 1\nPc 1\nd .3\nNi 1.5\n";
+    let obj = "mtllib x.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\n";
+    let model = load_bytes("obj", obj.as_bytes(), &[("x.mtl", mtl)]).expect("read");
+    assert!(model.world.materials[0].glass.is_some());
+    let named = |keyword| model.warnings.iter().any(|w| says(&w.message, keyword));
+    assert!(named("`Pm` is ignored") && named("`Pc` is ignored"), "{:?}", model.warnings);
+    let negative: &[(&str, &[u8])] = &[("x.mtl", b"newmtl a\nPm -1\n")];
+    let error = load_bytes("obj", obj.as_bytes(), negative).expect_err("refused").to_string();
+    assert!(says(&error, "`Pm -1`: at least 0 is possible"), "{error}");
 }
 
 #[test]

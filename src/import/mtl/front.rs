@@ -273,7 +273,10 @@ fn number_in(
     }
     let value = number(word)?;
     if !(min..=max).contains(&value) {
-        return Err(format!("`{keyword} {value}`: from {min} to {max} is possible"));
+        return Err(match max {
+            f64::MAX => format!("`{keyword} {value}`: at least {min} is possible"),
+            _ => format!("`{keyword} {value}`: from {min} to {max} is possible"),
+        });
     }
     Ok(value)
 }

@@ -46,6 +46,15 @@ pub(super) fn of(source: &Source, mtl: &tobj::Material) -> (Material, Vec<String
         if source.texture.is_some() {
             notes.push("texture left out: glass has none, `map_Kd` is ignored".into());
         }
+        let is_metal = source.metallic.is_some_and(|metallic| metallic > 0.0);
+        let is_coated = source.clearcoat.is_some_and(|coat| coat > 0.0);
+        for (keyword, is_given) in
+            [("Pm", is_metal), ("map_Pm", source.metallic_map.is_some()), ("Pc", is_coated)]
+        {
+            if is_given {
+                notes.push(format!("glass is neither metal nor coated: `{keyword}` is ignored"));
+            }
+        }
         if source.mask.is_some() {
             notes.push("cut-outs left out: glass has none, `map_d` is ignored".into());
         }

@@ -251,8 +251,13 @@ impl Libraries {
         }
         if let Some(bump) = normals {
             let normals = entry.normal_map(bump, images, model);
-            let warn = |message| model.warnings.push(entry.warning(message));
-            material.normal_map = normals.map_err(warn).ok();
+            let doubt = images.doubt(&entry.file(&bump.image), ImageUse::Normals);
+            let doubt = doubt.filter(|_| normals.is_ok()).map(|doubt| {
+                format!("normal map {} of line {}: {doubt}", bump.image.name, bump.line)
+            });
+            let mut warn = |message| model.warnings.push(entry.warning(message));
+            material.normal_map = normals.map_err(&mut warn).ok();
+            doubt.into_iter().for_each(warn);
         }
         if coloured && material.texture.is_some() {
             let message = "the texture is shown, the vertex colours are not";
