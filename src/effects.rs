@@ -6,7 +6,8 @@
 use crate::error::counted;
 use crate::math::Rgb;
 use crate::scene::{
-    Fog, Fresnel, Glass, GlassShadows, Light, Material, MeanLights, Mesh, Scene, Settings, ShotLens,
+    Fog, Fresnel, Glass, GlassShadows, Light, Material, MeanLights, Mesh, PRIMARIES, Scene,
+    Settings, ShotLens, ratio_count,
 };
 
 /// Which effects run.
@@ -62,7 +63,7 @@ impl EffectPlan {
     /// Why each effect runs or not, what only data decide (normals, the lens) among them.
     pub fn reasons(scene: &Scene, settings: &Settings, lens: &ShotLens) -> Vec<EffectReason> {
         let used = UsedMaterials::of(scene);
-        let mut reasons = Self::with_reasons(scene, settings, &used).1;
+        let (plan, mut reasons) = Self::with_reasons(scene, settings, &used);
         let smooth = scene.meshes.iter().filter(|m| m.normals.is_some()).count();
         let (blurs, lens) = lens.reason();
         let normals = format!("{smooth} of {} meshes have shading normals", scene.meshes.len());
@@ -74,7 +75,7 @@ impl EffectPlan {
             normal_maps(&used),
             EffectReason { effect: "smooth normals", runs: smooth > 0, why: normals },
             EffectReason { effect: "depth of field", runs: blurs, why: lens },
-            light_selection(scene, settings),
+            light_selection(scene, settings, &plan),
         ]);
         reasons
     }
@@ -130,6 +131,8 @@ impl EffectPlan {
         let lit_by_sky = diffuse || (lit && environment.is_some()) || scatters;
         let is_straight = settings.glass_shadows == GlassShadows::Straight;
         let is_through = used.glass > 0 && is_straight && (lit || lit_by_sky);
+        let coloured_shadows = is_through && used.coloured_glass > 0;
+        let colours = if coloured_shadows { PRIMARIES.len() } else { 1 };
         let none_lit = || "no diffuse or glossy surface to light".to_string();
         let plan = Self {
             mirror: decide(
@@ -224,7 +227,7 @@ impl EffectPlan {
                             format!(
                                 "{}, {samples}: importance in {width} x {height} cells and the cosine, {} kept",
                                 sky.environment.describe(&scene.textures),
-                                counted(sky.radiance.tints().len(), "ratio")
+                                counted(ratio_count(sky.radiance.tints().len(), colours), "ratio")
                             )
                         }
                     }
@@ -248,7 +251,7 @@ impl EffectPlan {
                     if is_straight { "straight" } else { "opaque" }
                 ),
             ),
-            coloured_shadows: is_through && used.coloured_glass > 0,
+            coloured_shadows,
             fog: decide(
                 "fog",
                 fog.is_some(),
@@ -353,7 +356,7 @@ fn vertex_colours(scene: &Scene, used: &UsedMaterials) -> EffectReason {
 }
 
 /// Whether points look at the lights that matter there only, and how many these are.
-fn light_selection(scene: &Scene, settings: &Settings) -> EffectReason {
+fn light_selection(scene: &Scene, settings: &Settings, plan: &EffectPlan) -> EffectReason {
     let lights = counted(scene.lights.len(), "light");
     let (runs, why) = match (&scene.light_cells, scene.selected_lights(settings)) {
         (None, _) => (false, format!("{lights}, all looked at everywhere")),
@@ -363,7 +366,9 @@ fn light_selection(scene: &Scene, settings: &Settings) -> EffectReason {
         (Some(cells), Some(_)) => {
             let MeanLights { main, area: _, tail, tail_samples: _ } = cells.mean();
             let memory = cells.memory() as f64 / 1e6;
-            let most = counted(cells.most_area() + cells.tints().len(), "ratio");
+            let colours = if plan.coloured_shadows { PRIMARIES.len() } else { 1 };
+            let of_tail = ratio_count(cells.tints().len(), colours);
+            let most = counted(cells.most_area() * colours + of_tail, "ratio");
             let why = format!(
                 "{lights}: at a point {main:.1} on average are traced each, {tail:.1} drawn from; \
                  {} cells of {memory:.1} MB, at most {most} kept for a point",

@@ -5,8 +5,8 @@
 //! comes from; `reuse` answers and never traces. All in scene space.
 
 use crate::film::Provenance;
-use crate::math::{DVec3, Rgb, Vec3};
-use crate::scene::{LightCells, Scene};
+use crate::math::{DVec3, Vec3};
+use crate::scene::{LightCells, PRIMARIES, Scene, ratio_count};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -255,14 +255,6 @@ pub enum Channel {
     Sky(u32),
 }
 
-/// The primary colours, of which three ratios of a light are kept.
-pub const PRIMARIES: [Rgb; 3] = [Rgb::X, Rgb::Y, Rgb::Z];
-
-/// The colours that `channels` ratios of a light are of, which has the colours `own` where no glass colours it.
-pub fn tints(own: &[Rgb], channels: usize) -> &[Rgb] {
-    own.get(..channels).unwrap_or(&PRIMARIES)
-}
-
 /// The lights whose ratios are kept.
 ///
 /// For an area light the ratio is that of shadowed to unshadowed irradiance at the shading normal;
@@ -298,7 +290,7 @@ impl Channels {
             channels.list.extend(slots.filter(|channel| is_kept(*channel)));
             channels.slots = channels.list.len();
             if channels.slots > 0 {
-                let tints = cells.tints().len().max(colours);
+                let tints = ratio_count(cells.tints().len(), colours);
                 let parts = (0..tints as u32).map(Channel::Tail);
                 channels.list.extend(parts.filter(|channel| is_kept(*channel)));
                 channels.tail = channels.list.len() - channels.slots;
@@ -314,7 +306,7 @@ impl Channels {
         }
         let first = channels.list.len();
         let tints = scene.environment.as_ref().map_or(1, |sky| sky.radiance.tints().len());
-        let parts = (0..tints.max(colours) as u32).map(Channel::Sky);
+        let parts = (0..ratio_count(tints, colours) as u32).map(Channel::Sky);
         channels.list.extend(parts.filter(|channel| is_kept(*channel)));
         channels.sky = first..channels.list.len();
         channels

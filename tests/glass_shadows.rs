@@ -9,13 +9,16 @@ mod moves;
 use common::{Job, cube, plate, pose, quad, render, render_scene, uv_sphere};
 use moves::{Set, codes};
 use std::f64::consts::PI;
+use std::path::Path;
 use tweenray::math::{Bounds3, DVec3, Rgb};
+use tweenray::reuse;
+use tweenray::reuse::store::{Compatibility, ReferenceRecord, decode};
 use tweenray::scene::{
     Camera, CameraPath, DirectionalLight, Environment, EnvironmentKind, Fog, Glass, GlassShadows,
     IntersectorKind, KeyPose, Light, Material, PointLight, QuadLight, Settings, Shot, SkyGradient,
     World, WorldSphere,
 };
-use tweenray::shade::optics;
+use tweenray::shade::{FrameJob, Reuse, optics};
 use tweenray::stats::{RayKind, ReuseCounts};
 
 const TINT: Rgb = Rgb::new(0.9, 0.5, 0.2);
@@ -206,59 +209,129 @@ fn fog_is_lit_through_glass() {
     close(share, TINT * (1.0 - optics::pane_reflectance(1.0, 1.5)) as f32, 1e-4);
 }
 
-/// A white floor under panes of red and clear glass, past which a camera moves.
-fn below_panes(lights: Vec<Light>, sky: Rgb, environment: Option<Environment>) -> Set {
-    let mut world = plate(Material::diffuse("white", Rgb::splat(0.6)), 6.0);
-    let red = world.add_material(pane(Rgb::new(1.0, 0.02, 0.02)));
+/// What lights a scene.
+#[derive(Default)]
+struct Lit {
+    lights: Vec<Light>,
+    sky: Rgb,
+    environment: Option<Environment>,
+}
+
+/// A floor under panes of glass, past which a camera moves.
+fn below_panes(lit: Lit, floor: Rgb, tint: Rgb) -> Set {
+    let mut world = plate(Material::diffuse("floor", floor), 6.0);
+    let coloured = world.add_material(pane(tint));
     for x in [-2.4, -1.2, 0.0, 1.2, 2.4] {
         let [west, east] = [x - 0.4, x + 0.4];
         let corners = [[west, 0.4], [east, 0.4], [east, -0.4], [west, -0.4]];
-        world.meshes.push(quad(corners.map(|[x, z]| DVec3::new(x, 1.5, z)), red));
+        world.meshes.push(quad(corners.map(|[x, z]| DVec3::new(x, 1.5, z)), coloured));
     }
     // Out of sight, so that a shadow ray counts as dear enough to be saved.
     let mut ball = uv_sphere(600, 400);
     ball.positions.iter_mut().for_each(|p| p.y -= 9.0);
     world.meshes.push(ball);
-    (world.lights, world.sky.radiance, world.environment) = (lights, sky, environment);
+    (world.lights, world.sky.radiance, world.environment) = (lit.lights, lit.sky, lit.environment);
     let key = |at: f64, x: f64| KeyPose { at, pose: pose((x, 1.2, 4.0), (x, 0.0, 0.0)) };
     Set::of(world, Shot::new(CameraPath::Keys(vec![key(0.0, -0.2), key(1.0, 0.2)]), 9, 40.0))
 }
 
+/// A lamp above the panes, of this half width.
+fn lamp(x: f64, half: f64, radiance: Rgb) -> Light {
+    let corners = [[-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0], [1.0, 1.0]];
+    let corners = corners.map(|[u, v]| DVec3::new(x + half * u, 3.0, half * v));
+    Light::Quad(QuadLight { corners, radiance, two_sided: true })
+}
+
+fn lamps(radiance: Rgb) -> Lit {
+    let lights = (0..24).map(|k| lamp(-4.6 + 0.4 * f64::from(k), 0.1, radiance)).collect();
+    Lit { lights, ..Lit::default() }
+}
+
+fn straight(set: &Set, size: (u32, u32)) -> Settings {
+    let own = set.settings(size, 1, 16);
+    Settings { glass_shadows: GlassShadows::Straight, ..own }
+}
+
 #[test]
 fn inferred_light_has_the_colour_that_glass_gives_it() {
-    let lamp = |x: f64, half: f64, strength: f32| {
-        let corners = [[-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0], [1.0, 1.0]]
-            .map(|[u, v]| DVec3::new(x + half * u, 3.0, half * v));
-        Light::Quad(QuadLight { corners, radiance: Rgb::splat(strength), two_sided: true })
-    };
-    let many = (0..24).map(|k| lamp(-4.6 + 0.4 * f64::from(k), 0.1, 12.0)).collect();
     let grey = Rgb::splat(0.5);
     let gradient = SkyGradient { zenith: grey, horizon: 0.5 * grey, ground: Rgb::ZERO };
     let gradient = Environment::new(EnvironmentKind::Gradient(gradient));
+    let one = Lit { lights: vec![lamp(0.0, 0.8, Rgb::splat(5.0))], ..Lit::default() };
+    let sky = || Lit { sky: grey, ..Lit::default() };
+    let outside = Lit { environment: Some(gradient), ..Lit::default() };
+    let dim = Rgb::new(12.0, 9.0, 0.0);
+    let [red, yellow, blue] =
+        [[1.0, 0.02, 0.02], [1.0, 1.0, 0.02], [0.02, 0.02, 1.0]].map(Rgb::from_array);
+    let white = Rgb::splat(0.6);
     let sets = [
-        ("lamp", below_panes(vec![lamp(0.0, 0.8, 5.0)], Rgb::ZERO, None)),
-        ("sky", below_panes(vec![], grey, None)),
-        ("lamps", below_panes(many, Rgb::ZERO, None)),
-        ("gradient", below_panes(vec![], Rgb::ZERO, Some(gradient))),
+        ("lamp, red", one, white, red),
+        ("sky, red", sky(), white, red),
+        ("sky, yellow", sky(), white, yellow),
+        ("sky, blue", sky(), white, blue),
+        ("lamps, red", lamps(Rgb::splat(12.0)), white, red),
+        ("lamps on red, red", lamps(Rgb::splat(12.0)), Rgb::new(0.6, 0.0, 0.0), red),
+        ("yellow lamps, red", lamps(dim), white, red),
+        ("gradient, red", outside, white, red),
     ];
-    for (name, set) in sets {
-        let own = set.settings((96, 64), 1, 16);
-        let settings = Settings { glass_shadows: GlassShadows::Straight, ..own };
+    for (name, lit, floor, tint) in sets {
+        let set = below_panes(lit, floor, tint);
+        let settings = straight(&set, (96, 64));
         let stage = set.stage(2);
         let frames: Vec<u32> = (1..=9).collect();
         let made = stage.frames(&settings, &set.shot, &frames);
         let (mut error, mut counts) = (DVec3::ZERO, ReuseCounts::default());
-        for (frame, made) in frames.iter().zip(&made) {
+        for (frame, made) in frames.iter().zip(&made).skip(1).step_by(3) {
             counts += made.reuse;
             let truth = stage.converged(&settings, &set.shot, *frame, 256);
             let [own, truth] = [&made.film, &truth].map(|film| codes(&settings, film));
             let pixels = own.len() as f64 / 255.0;
             let off = own.iter().zip(&truth).map(|(a, b)| DVec3::from(*a) - DVec3::from(*b));
-            error += off.sum::<DVec3>() / pixels / frames.len() as f64;
+            error += off.sum::<DVec3>() / pixels / 3.0;
         }
         let inferred = counts.direct_inferred as f64 / counts.direct as f64;
         println!("{name}: {error:.3} of 255, {inferred:.2} inferred");
         assert!(inferred > 0.2, "{name}: {inferred}");
-        assert!(error.abs().max_element() < 0.1, "{name}: {error}");
+        assert!(error.abs().max_element() < 0.12, "{name}: {error}");
+    }
+}
+
+#[test]
+fn what_is_kept_behind_coloured_glass_can_be_read_back() {
+    let one = Lit { lights: vec![lamp(0.0, 0.8, Rgb::splat(5.0))], ..Lit::default() };
+    let set = below_panes(one, Rgb::splat(0.6), TINT);
+    let settings = straight(&set, (96, 64));
+    let channels = reuse::channels(&set.scene, &settings);
+    assert_eq!((channels.len(), channels.colours()), (3, 3));
+    let camera = &set.shot.camera(1, 96, 64).unwrap();
+    let stage = set.stage(2);
+    let kept = Reuse { channels: &channels, inference: None };
+    let job = FrameJob { reuse: Some(kept), ..FrameJob::whole(camera, 1) };
+    let traced = &stage.renderer(&settings).render_job(&job, &stage.stop, &()).unwrap().sources;
+    let colours = traced.ratios.chunks(3).filter(|ratios| ratios[0] > ratios[2] + 0.1);
+    assert!(colours.count() > 100);
+    let terms = &Compatibility::of("world", &channels, &settings);
+    let (crop, findings, settings) = (None, &[][..], "");
+    let record = ReferenceRecord { terms, frame: 1, camera, crop, traced, findings, settings };
+    let bytes = record.encode().expect("few");
+    let recentring = &set.scene.recentring;
+    decode(Path::new("frame"), &bytes, terms, recentring, 96 * 64).expect("undamaged");
+}
+
+#[test]
+fn lamps_that_all_count_leave_no_tail() {
+    let far = |k: i32| {
+        let light = lamp(40.0 * f64::from(k - 4), 20.0, Rgb::splat(0.1));
+        let Light::Quad(mut quad) = light else { panic!("a quad") };
+        quad.corners.iter_mut().for_each(|corner| corner.y = 400.0);
+        Light::Quad(quad)
+    };
+    for tint in [Rgb::splat(0.5), TINT] {
+        let lit = Lit { lights: (0..9).map(far).collect(), sky: Rgb::splat(0.1), ..Lit::default() };
+        let set = below_panes(lit, Rgb::splat(0.6), tint);
+        let settings = straight(&set, (48, 32));
+        let stage = set.stage(2);
+        let made = stage.frames(&settings, &set.shot, &[4]);
+        assert!(made[0].reuse.direct > 0);
     }
 }

@@ -109,7 +109,7 @@ pub struct SettingArgs {
     #[arg(long, value_name = "N", help_heading = "Light",
         allow_negative_numbers = true, value_parser = whole(0, limits::MAX_SAMPLES))]
     pub fog_samples: Option<u32>,
-    /// What glass does to the light of lamps, sun and sky on its way to a surface: it blocks it, or lets it straight through [default: opaque]
+    /// What light does that meets glass on its way to a diffuse surface or to fog: it is blocked, or goes straight through [default: opaque]
     #[arg(long, value_name = "KIND", help_heading = "Light", value_parser = values::choice::<GlassShadows>(&["opaque", "straight"]))]
     pub glass_shadows: Option<GlassShadows>,
     /// Whether every point looks at every light in scenes of more than 8, not only at those that matter there

@@ -270,3 +270,47 @@ pub fn worth_lookups<'f>(
     let [direct, specular] = gains.map(|gain| gain > 0.0);
     LookupKinds { direct, specular }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::{DVec3, Rgb};
+    use crate::reuse::risk::STEPS;
+    use crate::scene::{Light, Material, QuadLight, World, WorldMesh};
+
+    /// A floor under a lamp.
+    fn scene() -> Scene {
+        let mut world = World::default();
+        world.materials.push(Material::diffuse("floor", Rgb::splat(0.5)));
+        let corners =
+            [[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 0.0]].map(|[x, z]| DVec3::new(x, 0.0, z));
+        world.meshes.push(WorldMesh::quad("floor", corners, 0));
+        let corners = corners.map(|corner| corner.with_y(2.0));
+        let radiance = Rgb::ONE;
+        world.lights.push(Light::Quad(QuadLight { corners, radiance, two_sided: true }));
+        world.into_scene(true).expect("a scene")
+    }
+
+    #[test]
+    fn kinds_of_points_are_looked_up_where_that_pays_for_them() {
+        let scene = scene();
+        let settings = Settings { spp: 4, shadow_samples: 64, ..Settings::default() };
+        let kept = channels(&scene, &settings);
+        assert!(!kept.is_empty());
+        let (direct, specular) = (0, 2 * STEPS as u8);
+        let found = |level, agreed| Finding { level, agreed, error: 0.0, noise: 1.0 };
+        let kinds = |samples: u32, findings: &[Finding]| {
+            let settings = Settings { shadow_samples: samples, ..settings.clone() };
+            let evidence = Evidence::of(findings.iter(), 0.25);
+            worth_lookups(&evidence, findings.iter(), (&scene, &kept, &settings), 0.0)
+        };
+        let both = [vec![found(direct, true); 500], vec![found(specular, true); 500]].concat();
+        assert_eq!(kinds(256, &both), LookupKinds::ALL);
+        // Four camera samples share a lookup where they are seen directly.
+        assert_eq!(kinds(16, &both), LookupKinds { direct: true, specular: false });
+        let none = LookupKinds { direct: false, specular: false };
+        assert_eq!((kinds(1, &both), none.any()), (none, false));
+        let wrong = [vec![found(direct, false); 500], vec![found(specular, true); 500]].concat();
+        assert_eq!(kinds(256, &wrong), LookupKinds { direct: false, specular: true });
+    }
+}

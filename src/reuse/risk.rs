@@ -117,6 +117,7 @@ mod tests {
         assert!(riskier.iter().all(|r| r.level() > 6 && usize::from(r.level()) < STEPS));
         let specular = Features { is_direct: false, ..features };
         assert_eq!(usize::from(specular.level()), 2 * STEPS + 6);
+        assert!(!is_direct(specular.level()) && riskier.iter().all(|r| is_direct(r.level())));
     }
 
     #[test]

@@ -33,6 +33,7 @@ mod settings;
 mod spline;
 mod texture;
 mod time;
+mod tints;
 mod too_small;
 mod vertex_colours;
 mod weld;
@@ -68,6 +69,7 @@ pub use settings::{
 };
 pub use texture::{PointRow, Texture, TextureId, TextureLevel, TextureMap, Wrap};
 pub use time::{SaveInterval, parse_time, parse_time_limit};
+pub use tints::{PRIMARIES, part, ratio_count, tints};
 pub use too_small::Collapsed;
 pub use vertex_colours::VertexColours;
 pub(crate) use weld::weld;

@@ -14,11 +14,11 @@ use super::selection::{LightUser, LightUsers, Reached, TailSamples};
 use super::sky_samples::EnvironmentScratch;
 use super::source::LightSource;
 use super::{FrameInput, Renderer, Reuse, dimensions, optics};
-use crate::inference;
 use crate::intersect::{Hit, Ray, SpawnPoint, SurfaceInteraction, lift_to_smooth};
 use crate::math::{DVec3, Rgb, luminance};
-use crate::scene::{Scene, Settings};
+use crate::scene::{Scene, Settings, tints};
 use crate::stats::{RayCounts, RayKind};
+use std::ops::Range;
 
 /// Shadow rays traced together.
 pub(super) const BATCH: usize = 256;
@@ -172,8 +172,8 @@ struct Gathered {
     tinted: Rgb,
 }
 
-/// The colour, of mean 1, of light of which these weights arrive through glass, by [`ShadowScratch::tinted`].
-fn tint(tinted: Rgb) -> Rgb {
+/// The colour, of mean 1, of light of which these weights arrive, by [`ShadowScratch::tinted`].
+fn mean_colour(tinted: Rgb) -> Rgb {
     let sum = tinted.element_sum();
     if sum > 0.0 { tinted * (3.0 / sum) } else { Rgb::ONE }
 }
@@ -217,14 +217,38 @@ impl ShadowScratch {
         self.exact[at]
     }
 
-    /// The ratio that is known of the light whose channels start at `channel`, for shading point `i`; NaN where any of
-    /// its colours is unknown.
-    fn known(&self, i: usize, channel: usize) -> Rgb {
+    /// The ratio that is known of the light whose channels start at `channel`, for shading point `i`, where `sent` would arrive
+    /// per unit of irradiance; NaN where any colour of that is unknown.
+    fn known(&self, i: usize, channel: usize, sent: Rgb) -> Rgb {
         let of = |k: usize| self.groups.known(i, channel + k, self.channels);
         match self.colours {
             1 => Rgb::splat(of(0)),
-            _ => Rgb::new(of(0), of(1), of(2)),
+            // Nobody is asked for what adds nothing.
+            _ => Rgb::from_array([0, 1, 2].map(|k| if sent[k] == 0.0 { 0.0 } else { of(k) })),
         }
+    }
+
+    /// What is known to arrive at shading point `i` of light that is kept in parts, which have these `channels` and `tints`;
+    /// `None` where a part that the surface reflects is unknown.
+    pub fn known_parts(
+        &self,
+        (lit, i): (&[ShadingPoint], usize),
+        channels: Range<usize>,
+        tints: &[Rgb],
+    ) -> Option<Rgb> {
+        let mut light = Rgb::ZERO;
+        for (channel, tint) in channels.zip(tints) {
+            let exact = self.exact[i * self.channels + channel];
+            if exact == 0.0 || lit[i].weight * *tint == Rgb::ZERO {
+                continue;
+            }
+            let ratio = self.groups.known(i, channel, self.channels);
+            if ratio.is_nan() {
+                return None;
+            }
+            light += *tint * (exact as f32 * ratio);
+        }
+        Some(light)
     }
 
     /// Notes it, and what of it the pixel would show.
@@ -269,7 +293,7 @@ impl ShadowScratch {
     }
 
     /// The weights of those of `rays` that reached the light, in colours; 0 if none of the batch went through glass.
-    fn tinted(&self, rays: std::ops::Range<usize>) -> Rgb {
+    fn tinted(&self, rays: Range<usize>) -> Rgb {
         if self.tints.is_empty() {
             return Rgb::ZERO;
         }
@@ -297,7 +321,7 @@ impl Renderer<'_> {
     ) -> Vec<LightSource> {
         let channels = reuse.map(|reuse| reuse.channels);
         let selects = channels.is_some_and(|channels| channels.slots() > 0);
-        let narrow = |channel: usize| channel as u16;
+        let narrow = |channel: usize| u16::try_from(channel).ok();
         let Self { plan, settings, .. } = self;
         let pilots = |least: Option<u32>, all: u32| match least {
             Some(least) if stops_early => least.min(all),
@@ -314,7 +338,8 @@ impl Renderer<'_> {
             };
             if runs {
                 let sampler = LightSampler::new(light);
-                let channel = channels.and_then(|channels| channels.of_light(number)).map(narrow);
+                let channel =
+                    channels.and_then(|channels| channels.of_light(number)).and_then(narrow);
                 let is_kept = channel.is_some() || (selects && light.is_area());
                 let pilots = pilots(least, samples);
                 sources.push(LightSource {
@@ -329,7 +354,7 @@ impl Renderer<'_> {
             }
         }
         if plan.sky_light && self.scene.environment.is_none() {
-            let channel = channels.and_then(|channels| channels.sky().next()).map(narrow);
+            let channel = channels.and_then(|channels| channels.sky().next()).and_then(narrow);
             sources.push(LightSource {
                 sampler: LightSampler::of_sky(&self.scene.sky),
                 number: self.scene.lights.len() as u32,
@@ -422,7 +447,7 @@ impl Renderer<'_> {
                 let exact = point.unshadowed(&source.sampler);
                 let sent = point.weight * source.sampler.emission;
                 let own = i as usize * channels + usize::from(slot);
-                for (k, tint) in tints(s.colours).iter().enumerate() {
+                for (k, tint) in ratio_colours(s.colours).iter().enumerate() {
                     s.exact[own + k] = exact;
                     let shown = luminance(sent * *tint) * exact as f32;
                     s.shown[own + k] = shown * self.settings.exposure;
@@ -499,9 +524,11 @@ impl Renderer<'_> {
         for (&LightUser { point: i, slot }, gathered) in wanted.iter().zip(&s.gathered) {
             let point = &lit[i as usize];
             let Gathered { exact, open, all, rays, tinted } = *gathered;
-            let tint = tint(tinted);
+            let tint = mean_colour(tinted);
             if let (Some(slot), true) = (slot, rays > 0) {
-                for (channel, open) in (usize::from(slot)..).zip(parts(open, tint, s.colours)) {
+                for (channel, open) in
+                    (usize::from(slot)..).zip(parts((open, all), tint, s.colours))
+                {
                     s.groups.add(i as usize, channel, s.channels, open, all);
                 }
             }
@@ -631,11 +658,13 @@ impl Renderer<'_> {
             let mut start = 0;
             for (LightUser { point: i, slot }, &end) in reached.iter().zip(&s.ends) {
                 let (open, weight) = opened(source, s, start..end);
-                let tint = tint(s.tinted(start..end));
+                let tint = mean_colour(s.tinted(start..end));
                 let rays = end - start;
                 start = end;
                 if let (Some(slot), true) = (slot, rays > 0) {
-                    for (channel, open) in (usize::from(slot)..).zip(parts(open, tint, s.colours)) {
+                    for (channel, open) in
+                        (usize::from(slot)..).zip(parts((open, weight), tint, s.colours))
+                    {
                         s.groups.note_checked(
                             i as usize,
                             (channel, channels),
@@ -684,12 +713,13 @@ impl Renderer<'_> {
                 continue;
             }
             s.groups.note_lit(i);
-            let ratio = s.known(i, channel);
+            let sent = point.weight * source.sampler.emission;
+            let ratio = s.known(i, channel, sent);
             if ratio.is_nan() {
                 wanted.push(user);
             } else {
                 pixels.note_ratio(at, point.place.pixel, ratio.element_sum() / 3.0);
-                let light = point.weight * source.sampler.emission * (exact as f32 * ratio);
+                let light = sent * (exact as f32 * ratio);
                 pixels.add(point.place.pixel, point.place.sample, light);
             }
         }
@@ -781,18 +811,20 @@ impl Renderer<'_> {
 }
 
 /// The colours that the ratios of a light are of, if there are `colours`.
-fn tints(colours: usize) -> &'static [Rgb] {
-    inference::tints(&[Rgb::ONE], colours)
+fn ratio_colours(colours: usize) -> &'static [Rgb] {
+    tints(&[Rgb::ONE], colours)
 }
 
-/// The parts of the weights `open` in each of so many `colours`, if all of them have the colour `tint`, of mean 1.
-fn parts(open: f64, tint: Rgb, colours: usize) -> impl Iterator<Item = f64> {
-    let part = move |own: f32| if colours == 1 { open } else { open * f64::from(own) };
+/// The parts of the weights `open` of `all` in each of so many `colours`, if they have the colour `tint`, of mean 1.
+fn parts((open, all): (f64, f64), tint: Rgb, colours: usize) -> impl Iterator<Item = f64> {
+    // Rounding must not make it more than all. NaN stays what it is.
+    let at_most = move |open: f64| if open > all { all } else { open };
+    let part = move |own: f32| if colours == 1 { open } else { at_most(open * f64::from(own)) };
     tint.to_array().into_iter().take(colours).map(part)
 }
 
 /// Sums of the weights of those of the batch's `rays` to `source` that are not occluded, and of all.
-fn opened(source: &LightSource, s: &ShadowScratch, rays: std::ops::Range<usize>) -> (f64, f64) {
+fn opened(source: &LightSource, s: &ShadowScratch, rays: Range<usize>) -> (f64, f64) {
     let (mut open, mut all) = (0.0, 0.0);
     for k in rays.clone() {
         all += s.weights[k];

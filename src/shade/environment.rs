@@ -16,8 +16,8 @@ use super::pixels::BlockPixels;
 use super::point::ShadingPoint;
 use super::sky_samples::FoundSky;
 use super::{Renderer, Reuse, normal_map};
-use crate::inference;
 use crate::math::{DVec3, Rgb, luminance};
+use crate::scene::{part, tints};
 use crate::stats::{RayCounts, RayKind};
 use std::ops::Range;
 
@@ -32,11 +32,6 @@ pub(super) struct EnvironmentSource<'a> {
     channels: Range<usize>,
     /// Channels of a point.
     all_channels: usize,
-}
-
-/// How much of a colour there is in `light`.
-fn part(light: Rgb, tint: Rgb) -> f64 {
-    f64::from(light.dot(tint) / tint.length_squared())
 }
 
 impl EnvironmentSource<'_> {
@@ -63,7 +58,7 @@ impl EnvironmentSource<'_> {
 
     /// The colours that its ratios are kept of; none where none is kept.
     fn tints(&self) -> &[Rgb] {
-        inference::tints(self.light.tints(), self.channels.len())
+        tints(self.light.tints(), self.channels.len())
     }
 
     /// What arrives at a point where nothing is in the way.
@@ -85,23 +80,9 @@ impl EnvironmentSource<'_> {
     }
 
     /// What arrives at shading point `i` if that is known, as it is where nothing can arrive; `None` where nothing is kept.
-    fn known(&self, s: &ShadowScratch, i: usize) -> Option<Rgb> {
-        if self.channels.is_empty() {
-            return None;
-        }
-        let mut light = Rgb::ZERO;
-        for (channel, (at, tint)) in self.channels.clone().zip(self.places(i)) {
-            let exact = s.exact(at);
-            if exact == 0.0 {
-                continue;
-            }
-            let ratio = s.groups.known(i, channel, self.all_channels);
-            if ratio.is_nan() {
-                return None;
-            }
-            light += tint * (exact as f32 * ratio);
-        }
-        Some(light)
+    fn known(&self, s: &ShadowScratch, lit: &[ShadingPoint], i: usize) -> Option<Rgb> {
+        let is_kept = !self.channels.is_empty();
+        is_kept.then(|| s.known_parts((lit, i), self.channels.clone(), self.tints())).flatten()
     }
 }
 
@@ -185,7 +166,7 @@ impl Renderer<'_> {
         counts: &mut RayCounts,
     ) {
         for (i, point) in lit.iter().enumerate() {
-            if let Some(light) = source.known(s, i) {
+            if let Some(light) = source.known(s, lit, i) {
                 if source.places(i).any(|(at, _)| s.exact(at) != 0.0) {
                     s.groups.note_lit(i);
                 }
@@ -194,7 +175,7 @@ impl Renderer<'_> {
         }
         let wanted = |s: &ShadowScratch, i: usize| {
             let first = lit[i].place.sample.wrapping_mul(source.samples);
-            source.known(s, i).is_none().then_some((first, source.samples as usize))
+            source.known(s, lit, i).is_none().then_some((first, source.samples as usize))
         };
         self.cast_to_environment(source, lit, pixels, wanted, s, counts);
         let found = std::mem::take(&mut s.environment.found);

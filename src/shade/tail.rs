@@ -12,9 +12,8 @@ use super::point::{SamplePlace, ShadingPoint};
 use super::selection::{FoundLight, LightSelection, TailSamples};
 use super::source::LightSource;
 use super::{FrameInput, Renderer, Reuse, dimensions};
-use crate::inference;
 use crate::math::{Rgb, luminance};
-use crate::scene::Tail;
+use crate::scene::{Tail, part, tints};
 use crate::stats::RayCounts;
 use std::ops::Range;
 
@@ -54,7 +53,7 @@ impl<'a> TailChannels<'a> {
     /// `None` where no ratio of the tail is kept.
     fn of(reuse: &Reuse, selection: &'a LightSelection) -> Option<Self> {
         let Range { start: first, end } = reuse.channels.tail();
-        let tints = inference::tints(selection.tints(), end - first);
+        let tints = tints(selection.tints(), end - first);
         (!tints.is_empty()).then_some(Self { first, tints, all: reuse.channels.len() })
     }
 
@@ -64,22 +63,8 @@ impl<'a> TailChannels<'a> {
 
     /// What arrives at shading point `i` if that is known, as it is where nothing can arrive.
     fn known(self, s: &ShadowScratch, lit: &[ShadingPoint], i: usize) -> Option<Rgb> {
-        if lit[i].is_mapped() {
-            return None;
-        }
-        let mut light = Rgb::ZERO;
-        for (channel, (at, tint)) in self.range().zip(self.places(i)) {
-            let exact = s.exact(at);
-            if exact == 0.0 {
-                continue;
-            }
-            let ratio = s.groups.known(i, channel, self.all);
-            if ratio.is_nan() {
-                return None;
-            }
-            light += tint * (exact as f32 * ratio);
-        }
-        Some(light)
+        let is_kept = !lit[i].is_mapped();
+        is_kept.then(|| s.known_parts((lit, i), self.range(), self.tints)).flatten()
     }
 
     /// The places of a shading point's channels among those of all, with their colours.
@@ -87,11 +72,6 @@ impl<'a> TailChannels<'a> {
         let first = i * self.all + self.first;
         (first..).zip(self.tints.iter().copied())
     }
-}
-
-/// How much of a colour there is in `light`.
-fn part(light: Rgb, tint: Rgb) -> f64 {
-    f64::from(light.dot(tint) / tint.length_squared())
 }
 
 impl Renderer<'_> {

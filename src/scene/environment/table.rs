@@ -8,7 +8,7 @@ use super::EnvironmentRadiance;
 use crate::math::Vec2;
 use crate::math::{DVec3, Rgb, bulk};
 use crate::sampling::GridDistribution;
-use crate::scene::{Texture, Wrap};
+use crate::scene::{PRIMARIES, Texture, Wrap};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{FRAC_1_PI, PI, TAU};
@@ -210,7 +210,7 @@ fn tints(cells: &[Rgb]) -> Vec<Rgb> {
     };
     match cells.iter().all(is_same) {
         true => vec![colour],
-        false => vec![Rgb::X, Rgb::Y, Rgb::Z],
+        false => PRIMARIES.to_vec(),
     }
 }
 

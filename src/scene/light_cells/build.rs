@@ -2,7 +2,7 @@
 
 use super::{Cell, CellLight, FEW_LIGHTS, LightCells, MOST_MAIN, MeanLights, Node, root};
 use crate::math::{Bounds3, DVec3, Rgb};
-use crate::scene::{Light, Scene};
+use crate::scene::{Light, PRIMARIES, Scene};
 use rayon::prelude::*;
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
@@ -170,11 +170,7 @@ fn tints(lights: &[Light]) -> Vec<Rgb> {
     let of = |colour: Rgb| colour / colour.element_sum();
     let first = colours.next().map_or(Rgb::ONE, of);
     let is_same = |own: Rgb| (own - first).abs().cmple(SAME_COLOUR * own.max(first)).all();
-    if colours.all(|colour| is_same(of(colour))) {
-        vec![first]
-    } else {
-        vec![Rgb::X, Rgb::Y, Rgb::Z]
-    }
+    if colours.all(|colour| is_same(of(colour))) { vec![first] } else { PRIMARIES.to_vec() }
 }
 
 /// The most that a light sends to any corner of a box, where that is finite.

@@ -1,0 +1,25 @@
+//! The colours that light is made up of, of each of which a ratio is kept for other frames.
+
+use crate::math::Rgb;
+
+/// The primary colours: of light of several colours, and where glass may colour it.
+pub const PRIMARIES: [Rgb; 3] = [Rgb::X, Rgb::Y, Rgb::Z];
+
+/// How many ratios are kept of light that has `own` colours where no glass colours it, and of which there are `colours` where
+/// glass may.
+pub fn ratio_count(own: usize, colours: usize) -> usize {
+    if own == 0 { 0 } else { own.max(colours) }
+}
+
+/// The colours that so many ratios are of, of light that has the colours `own` where no glass colours it.
+pub fn tints(own: &[Rgb], ratios: usize) -> &[Rgb] {
+    match ratios == PRIMARIES.len() {
+        true => &PRIMARIES,
+        false => &own[..ratios],
+    }
+}
+
+/// How much of a colour there is in `light`.
+pub fn part(light: Rgb, tint: Rgb) -> f64 {
+    f64::from(light.dot(tint) / tint.length_squared())
+}
