@@ -8,7 +8,7 @@ use support::Candidate;
 use tweenray::film::{Provenance, ProvenanceKind};
 use tweenray::inference::{Channels, Inference, LookupBatch};
 use tweenray::output::{WriteOptions, write_image};
-use tweenray::reuse::{self, Lookup, LookupKinds, Reference};
+use tweenray::reuse::{self, Lookup, Reference};
 use tweenray::scene::{Camera, Policy, Settings, Shot};
 use tweenray::sequence::Pyramid;
 use tweenray::shade::{FrameJob, Rendered, Renderer, Reuse};
@@ -40,7 +40,7 @@ struct Taken<'a> {
 
 impl Inference for Taken<'_> {
     fn infer(&self, batch: &mut LookupBatch) {
-        self.lookup.estimate(batch, LookupKinds::ALL);
+        self.lookup.estimate(batch);
         let LookupBatch { ratios, estimates, .. } = batch;
         for (ratio, estimate) in ratios.iter_mut().zip(estimates) {
             let is_missed = estimate.ratio.is_nan() && !self.misses;

@@ -2,10 +2,9 @@
 //! every machine decides alike.
 
 use super::evidence::{Evidence, Finding};
-use super::risk::is_direct;
 use crate::effects::EffectPlan;
 use crate::error::counted;
-use crate::inference::{Channel, Channels, SAMPLES_TOGETHER, SurfacePoint, check_rays};
+use crate::inference::{Channel, Channels, SAMPLES_TOGETHER, check_rays};
 use crate::scene::{MeanLights, Scene, Settings};
 use crate::stats::{RayCounts, RayKind};
 
@@ -76,7 +75,7 @@ pub fn channels(scene: &Scene, settings: &Settings) -> Channels {
         runs && plan.diffuse
             && is_worth(scene, expected_rays(channel, settings).saturating_mul(settings.spp))
     });
-    let cost = PointCost::of(scene, &kept, settings, settings.spp.min(SAMPLES_TOGETHER));
+    let cost = PointCost::of(scene, &kept, settings);
     if cost.traced > cost.checked + cost.lookup {
         kept
     } else {
@@ -177,7 +176,7 @@ pub fn of_frame(rays: &RayCounts, lookups: u64) -> f64 {
     of_rays.iter().sum::<f64>() + LOOKUP * lookups as f64
 }
 
-/// Costs of the light of one surface point.
+/// Costs of the light of one surface point, whose camera samples are shaded together.
 struct PointCost {
     /// Cost of tracing, in camera rays.
     traced: f64,
@@ -188,8 +187,8 @@ struct PointCost {
 }
 
 impl PointCost {
-    /// The costs of a point for which this many camera `samples` stand, which are shaded together.
-    fn of(scene: &Scene, channels: &Channels, settings: &Settings, samples: u32) -> Self {
+    fn of(scene: &Scene, channels: &Channels, settings: &Settings) -> Self {
+        let samples = settings.spp.min(SAMPLES_TOGETHER);
         let mean = scene.light_cells.as_ref().map(|cells| cells.mean()).unwrap_or_default();
         let MeanLights { area, tail_samples, .. } = mean;
         // Few points have as many lights as they have channels for.
@@ -221,96 +220,20 @@ impl PointCost {
     }
 }
 
-/// The kinds of surface points that are looked up.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct LookupKinds {
-    /// Those that are seen directly.
-    pub direct: bool,
-    /// Those that are seen in mirrors and through glass.
-    pub specular: bool,
-}
-
-impl LookupKinds {
-    /// All of them.
-    pub const ALL: Self = Self { direct: true, specular: true };
-
-    /// Whether there is any.
-    pub fn any(self) -> bool {
-        self.direct || self.specular
-    }
-
-    /// Whether `point` is of one.
-    pub fn has(self, point: &SurfacePoint) -> bool {
-        if point.direct { self.direct } else { self.specular }
-    }
-}
-
-/// For which kinds of points lookups save more than they cost, by the `findings` of probes, if those estimates are used that
+/// Whether lookups save more than they cost, by the `findings` of probes, if those estimates are used that
 /// `evidence` allows. A share `probed` of the points is probed, each of which is traced once more.
-pub fn worth_lookups<'f>(
+pub fn is_worth_lookups<'f>(
     evidence: &Evidence,
     findings: impl Iterator<Item = &'f Finding>,
     (scene, channels, settings): (&Scene, &Channels, &Settings),
     probed: f64,
-) -> LookupKinds {
-    let samples = settings.spp.min(SAMPLES_TOGETHER);
-    let mut gains = [0.0; 2];
-    // In mirrors and glass each camera sample is a point of its own.
-    let costs = [samples, 1].map(|samples| PointCost::of(scene, channels, settings, samples));
-    for finding in findings {
-        let kind = usize::from(!is_direct(finding.level));
-        let cost = &costs[kind];
-        let saved = match (evidence.may_use(finding.level, 1.0), finding.agreed) {
-            (true, true) => cost.traced - cost.checked,
-            (true, false) => -cost.checked,
-            (false, _) => 0.0,
-        };
-        gains[kind] += saved - probed * cost.traced - cost.lookup;
-    }
-    let [direct, specular] = gains.map(|gain| gain > 0.0);
-    LookupKinds { direct, specular }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::math::{DVec3, Rgb};
-    use crate::reuse::risk::STEPS;
-    use crate::scene::{Light, Material, QuadLight, World, WorldMesh};
-
-    /// A floor under a lamp.
-    fn scene() -> Scene {
-        let mut world = World::default();
-        world.materials.push(Material::diffuse("floor", Rgb::splat(0.5)));
-        let corners =
-            [[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 0.0]].map(|[x, z]| DVec3::new(x, 0.0, z));
-        world.meshes.push(WorldMesh::quad("floor", corners, 0));
-        let corners = corners.map(|corner| corner.with_y(2.0));
-        let radiance = Rgb::ONE;
-        world.lights.push(Light::Quad(QuadLight { corners, radiance, two_sided: true }));
-        world.into_scene(true).expect("a scene")
-    }
-
-    #[test]
-    fn kinds_of_points_are_looked_up_where_that_pays_for_them() {
-        let scene = scene();
-        let settings = Settings { spp: 4, shadow_samples: 64, ..Settings::default() };
-        let kept = channels(&scene, &settings);
-        assert!(!kept.is_empty());
-        let (direct, specular) = (0, 2 * STEPS as u8);
-        let found = |level, agreed| Finding { level, agreed, error: 0.0, noise: 1.0 };
-        let kinds = |samples: u32, findings: &[Finding]| {
-            let settings = Settings { shadow_samples: samples, ..settings.clone() };
-            let evidence = Evidence::of(findings.iter(), 0.25);
-            worth_lookups(&evidence, findings.iter(), (&scene, &kept, &settings), 0.0)
-        };
-        let both = [vec![found(direct, true); 500], vec![found(specular, true); 500]].concat();
-        assert_eq!(kinds(256, &both), LookupKinds::ALL);
-        // Four camera samples share a lookup where they are seen directly.
-        assert_eq!(kinds(16, &both), LookupKinds { direct: true, specular: false });
-        let none = LookupKinds { direct: false, specular: false };
-        assert_eq!((kinds(1, &both), none.any()), (none, false));
-        let wrong = [vec![found(direct, false); 500], vec![found(specular, true); 500]].concat();
-        assert_eq!(kinds(256, &wrong), LookupKinds { direct: false, specular: true });
-    }
+) -> bool {
+    let cost = PointCost::of(scene, channels, settings);
+    let saved = |finding: &Finding| match (evidence.may_use(finding.level, 1.0), finding.agreed) {
+        (true, true) => cost.traced - cost.checked,
+        (true, false) => -cost.checked,
+        (false, _) => 0.0,
+    };
+    let gain = |finding: &Finding| saved(finding) - probed * cost.traced - cost.lookup;
+    findings.map(gain).sum::<f64>() > 0.0
 }

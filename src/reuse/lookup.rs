@@ -10,7 +10,6 @@ mod estimate;
 pub(super) use estimate::steps_per_radiance;
 
 use super::check::agrees;
-use super::cost::LookupKinds;
 use super::evidence::Evidence;
 use super::reference::{NONE, Reference};
 use super::taps::{ALWAYS, References, TOGETHER, Taps, Taps4, sum};
@@ -34,8 +33,6 @@ pub struct Lookup<'a> {
 pub struct Judged<'a> {
     /// The source of estimates.
     pub lookup: &'a Lookup<'a>,
-    /// The kinds of points that are looked up; all others are traced.
-    pub kinds: LookupKinds,
     /// The evidence that judges the estimates of a pixel (column, row).
     pub evidence: &'a (dyn Fn([u32; 2]) -> &'a Evidence + Sync),
     /// Error that counts as invisible, display steps.
@@ -44,7 +41,7 @@ pub struct Judged<'a> {
 
 impl Inference for Judged<'_> {
     fn infer(&self, batch: &mut LookupBatch) {
-        self.lookup.estimate(batch, self.kinds);
+        self.lookup.estimate(batch);
         let LookupBatch { points, pixels, ratios, estimates, provenance, checks, .. } = batch;
         let channels = self.lookup.rays.len();
         let answers = ratios.chunks_exact_mut(channels).zip(estimates.chunks_exact(channels));
@@ -78,8 +75,8 @@ impl Inference for Judged<'_> {
 }
 
 impl Lookup<'_> {
-    /// Fills estimates and provenance for all points of these kinds.
-    pub fn estimate(&self, batch: &mut LookupBatch, kinds: LookupKinds) {
+    /// Fills estimates and provenance for all points.
+    pub fn estimate(&self, batch: &mut LookupBatch) {
         let LookupBatch { points, unshadowed, lights, estimates, provenance, .. } = batch;
         let channels = self.rays.len();
         estimates.clear();
@@ -98,10 +95,10 @@ impl Lookup<'_> {
                 own.and_then(|own| own.get(..channels)).unwrap_or_default()
             };
             let shown = |i: usize| &unshadowed[i * channels..][..channels];
-            let is_asked = |i: usize| kinds.has(&points[i]) && shown(i).iter().any(|s| *s != 0.0);
+            let is_lit = |i: usize| shown(i).iter().any(|s| *s != 0.0);
             let mut found: [[Option<Taps4>; ALWAYS]; TOGETHER] = [[None; ALWAYS]; TOGETHER];
-            references.find(points, is_asked, &mut found);
-            for (i, point) in points.iter().enumerate().filter(|(i, _)| is_asked(*i)) {
+            references.find(points, is_lit, &mut found);
+            for (i, point) in points.iter().enumerate().filter(|(i, _)| is_lit(*i)) {
                 references.gather(point, &found[i], &mut taps);
                 if taps.weight >= LEAST_WEIGHT {
                     let own = &mut estimates[i * channels..][..channels];

@@ -1,8 +1,8 @@
 //! Probes: the pixels that are both estimated and traced, and the errors found at them.
 
+use super::Lookup;
 use super::check::agrees;
 use super::evidence::{Finding, LightComparison, finding_of};
-use super::{Lookup, LookupKinds};
 use crate::film::Provenance;
 use crate::inference::{Estimate, Inference, LookupBatch, SurfacePoint, channel_of};
 use crate::sampling::mix;
@@ -175,7 +175,7 @@ impl Inference for Probe<'_> {
     fn infer(&self, batch: &mut LookupBatch) {
         batch.estimates.clear();
         if let Some(lookup) = self.lookup {
-            lookup.estimate(batch, LookupKinds::ALL);
+            lookup.estimate(batch);
             // Probes show their traces.
             batch.provenance.fill(Provenance::default());
             let is_known = |estimate: &Estimate| !estimate.ratio.is_nan();

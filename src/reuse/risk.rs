@@ -39,11 +39,6 @@ pub struct Features {
     pub is_direct: bool,
 }
 
-/// Whether a level is of points that are seen directly.
-pub fn is_direct(level: u8) -> bool {
-    usize::from(level) < 2 * STEPS
-}
-
 impl Features {
     /// The level of risk, below [`LEVELS`].
     pub fn level(&self) -> u8 {
@@ -117,7 +112,6 @@ mod tests {
         assert!(riskier.iter().all(|r| r.level() > 6 && usize::from(r.level()) < STEPS));
         let specular = Features { is_direct: false, ..features };
         assert_eq!(usize::from(specular.level()), 2 * STEPS + 6);
-        assert!(!is_direct(specular.level()) && riskier.iter().all(|r| is_direct(r.level())));
     }
 
     #[test]

@@ -124,16 +124,14 @@ impl<'a> SurfaceReuse<'a> {
         let probed = self.probes(frame, &camera, &references)?;
         let known = probed.as_ref().map(|probed| probed.shown());
         let job = FrameJob { mask, known, beyond_crop: is_due, ..self.context.job(frame, &camera) };
-        let Some(probed) = probed.as_ref().filter(|probed| probed.kinds.any()) else {
+        let Some(probed) = probed.as_ref().filter(|probed| probed.is_worth_lookups) else {
             return self.render(job, None, progress);
         };
         self.with_lookup((frame, &camera), &references, |lookup| {
             let evidence = |_| &probed.evidence;
             let tolerance = self.context.renderer.settings.reuse.tolerance;
-            let kinds = probed.kinds;
-            let judged = lookup.as_ref();
             let judged =
-                judged.map(|lookup| Judged { lookup, kinds, evidence: &evidence, tolerance });
+                lookup.as_ref().map(|lookup| Judged { lookup, evidence: &evidence, tolerance });
             self.render(job, judged.as_ref().map(|judged| judged as &dyn Inference), progress)
         })
     }

@@ -4,8 +4,8 @@ use super::Lookup;
 use crate::film::Provenance;
 use crate::inference::{Estimate, LookupBatch, SurfacePoint, TracedPoint, TracedPoints};
 use crate::math::{DVec3, Vec3};
+use crate::reuse::Reference;
 use crate::reuse::risk::STEPS;
-use crate::reuse::{LookupKinds, Reference};
 use crate::scene::{Camera, Pose};
 
 const EDGE: u32 = 64;
@@ -56,7 +56,7 @@ fn estimated(reference: &Reference, point: SurfacePoint) -> Estimate {
         provenance: vec![Provenance::default()],
         ..LookupBatch::default()
     };
-    lookup.estimate(&mut asked, LookupKinds::ALL);
+    lookup.estimate(&mut asked);
     asked.estimates[0]
 }
 
@@ -217,7 +217,7 @@ fn lights_share_their_level() {
             provenance: vec![Provenance::default()],
             ..LookupBatch::default()
         };
-        lookup.estimate(&mut asked, LookupKinds::ALL);
+        lookup.estimate(&mut asked);
         assert_eq!(asked.estimates[0].level, asked.estimates[1].level);
         asked.estimates[0].level
     };

@@ -14,9 +14,7 @@ use crate::inference::Inference;
 use crate::output::Display;
 use crate::reuse::audit::{self, AuditedFrame, AuditedPixel};
 use crate::reuse::evidence::{Evidence, Finding};
-use crate::reuse::{
-    Judged, Lookup, LookupKinds, PARTS, Probe, ProbeDraw, Reference, worth_lookups,
-};
+use crate::reuse::{Judged, Lookup, PARTS, Probe, ProbeDraw, Reference, is_worth_lookups};
 use crate::scene::Camera;
 use crate::shade::{FrameJob, Known, Rendered, Sampling};
 use crate::stats::{AuditSums, RayCounts};
@@ -49,8 +47,8 @@ pub(super) struct Probed {
     pub evidence: Evidence,
     /// For each part of the probes the evidence from the findings of the other parts.
     crossed: Vec<Evidence>,
-    /// The kinds of points for which lookups save more than they cost.
-    pub kinds: LookupKinds,
+    /// Whether lookups save more than they cost.
+    pub is_worth_lookups: bool,
 }
 
 impl Probed {
@@ -88,8 +86,8 @@ impl SurfaceReuse<'_> {
         let known = lookup.references.iter().filter(|r| !r.findings().is_empty()).count();
         let pixels = f64::from(camera.width) * f64::from(camera.height);
         let usual = f64::from(r.settings.reuse.probes) * (LEAST / pixels).max(1.0);
-        let kinds = |known: &Evidence| worth_lookups(known, before(), cast, usual);
-        let is_hopeless = known > 0 && !kinds(&Evidence::of(before(), tolerance)).any();
+        let is_worth = |known: &Evidence| is_worth_lookups(known, before(), cast, usual);
+        let is_hopeless = known > 0 && !is_worth(&Evidence::of(before(), tolerance));
         let first = if is_hopeless { HOPELESS } else { FIRST[known.min(FIRST.len() - 1)] };
         let share = (first * usual).min(MOST);
         // In mirrors and glass the footprint of a pixel is computed from neighbouring pixels.
@@ -123,9 +121,10 @@ impl SurfaceReuse<'_> {
         let findings: Vec<Finding> = found.iter().flat_map(|(_, f)| f).copied().collect();
         let evidence = Evidence::of(before().chain(&findings), tolerance);
         // The frame's own probes are traced in any case, so they cost nothing more.
-        let kinds = worth_lookups(&evidence, findings.iter(), cast, 0.0);
+        let is_worth_lookups = is_worth_lookups(&evidence, findings.iter(), cast, 0.0);
         let traces = [first, second];
-        let probed = Probed { draw, mask, traces, counts, findings, evidence, crossed, kinds };
+        let probed =
+            Probed { draw, mask, traces, counts, findings, evidence, crossed, is_worth_lookups };
         let probed = Arc::new(probed);
         self.with_state(|s| s.probed = Some((frame, Arc::clone(&probed))));
         Ok(probed)
@@ -201,8 +200,7 @@ impl SurfaceReuse<'_> {
             let Some(lookup) = lookup else { return Ok((RayCounts::default(), None)) };
             let evidence = |[x, y]: [u32; 2]| &probed.crossed[probed.draw.part(x, y)];
             let tolerance = self.context.renderer.settings.reuse.tolerance;
-            let (lookup, kinds) = (&lookup, probed.kinds);
-            let judged = Judged { lookup, kinds, evidence: &evidence, tolerance };
+            let judged = Judged { lookup: &lookup, evidence: &evidence, tolerance };
             let job = self.job(camera, frame | STREAMS[2], &probed.mask);
             let job = FrameJob { sampling: probed.sampling(), ..job };
             let inferred = self.render(job, Some(&judged), &())?;
