@@ -6,8 +6,8 @@
 use crate::error::counted;
 use crate::math::Rgb;
 use crate::scene::{
-    Fog, Fresnel, Glass, GlassShadows, Light, Material, MeanLights, Mesh, PRIMARIES, Scene,
-    Settings, ShotLens, ratio_count,
+    Fog, Fresnel, Glass, GlassShadows, Light, Material, MeanLights, Mesh, Scene, Settings,
+    ShotLens, ratio_count,
 };
 
 /// Which effects run.
@@ -132,7 +132,6 @@ impl EffectPlan {
         let is_straight = settings.glass_shadows == GlassShadows::Straight;
         let is_through = used.glass > 0 && is_straight && (lit || lit_by_sky);
         let coloured_shadows = is_through && used.coloured_glass > 0;
-        let colours = if coloured_shadows { PRIMARIES.len() } else { 1 };
         let none_lit = || "no diffuse or glossy surface to light".to_string();
         let plan = Self {
             mirror: decide(
@@ -227,7 +226,10 @@ impl EffectPlan {
                             format!(
                                 "{}, {samples}: importance in {width} x {height} cells and the cosine, {} kept",
                                 sky.environment.describe(&scene.textures),
-                                counted(ratio_count(sky.radiance.tints().len(), colours), "ratio")
+                                counted(
+                                    ratio_count(sky.radiance.tints().len(), coloured_shadows),
+                                    "ratio"
+                                )
                             )
                         }
                     }
@@ -366,9 +368,9 @@ fn light_selection(scene: &Scene, settings: &Settings, plan: &EffectPlan) -> Eff
         (Some(cells), Some(_)) => {
             let MeanLights { main, area: _, tail, tail_samples: _ } = cells.mean();
             let memory = cells.memory() as f64 / 1e6;
-            let colours = if plan.coloured_shadows { PRIMARIES.len() } else { 1 };
-            let of_tail = ratio_count(cells.tints().len(), colours);
-            let most = counted(cells.most_area() * colours + of_tail, "ratio");
+            let [of_light, of_tail] =
+                [1, cells.tints().len()].map(|own| ratio_count(own, plan.coloured_shadows));
+            let most = counted(cells.most_area() * of_light + of_tail, "ratio");
             let why = format!(
                 "{lights}: at a point {main:.1} on average are traced each, {tail:.1} drawn from; \
                  {} cells of {memory:.1} MB, at most {most} kept for a point",

@@ -6,7 +6,7 @@
 
 use crate::film::Provenance;
 use crate::math::{DVec3, Vec3};
-use crate::scene::{LightCells, PRIMARIES, Scene, ratio_count};
+use crate::scene::{LightCells, Scene, ratio_count};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -279,7 +279,7 @@ impl Channels {
         is_coloured: bool,
         is_kept: impl Fn(Channel) -> bool,
     ) -> Self {
-        let colours = if is_coloured { PRIMARIES.len() } else { 1 };
+        let colours = ratio_count(1, is_coloured);
         let of_light = vec![None; scene.lights.len()];
         let mut channels = Self { of_light, colours, ..Self::default() };
         let parts = 0..colours as u32;
@@ -290,7 +290,7 @@ impl Channels {
             channels.list.extend(slots.filter(|channel| is_kept(*channel)));
             channels.slots = channels.list.len();
             if channels.slots > 0 {
-                let tints = ratio_count(cells.tints().len(), colours);
+                let tints = ratio_count(cells.tints().len(), is_coloured);
                 let parts = (0..tints as u32).map(Channel::Tail);
                 channels.list.extend(parts.filter(|channel| is_kept(*channel)));
                 channels.tail = channels.list.len() - channels.slots;
@@ -306,7 +306,7 @@ impl Channels {
         }
         let first = channels.list.len();
         let tints = scene.environment.as_ref().map_or(1, |sky| sky.radiance.tints().len());
-        let parts = (0..ratio_count(tints, colours) as u32).map(Channel::Sky);
+        let parts = (0..ratio_count(tints, is_coloured) as u32).map(Channel::Sky);
         channels.list.extend(parts.filter(|channel| is_kept(*channel)));
         channels.sky = first..channels.list.len();
         channels

@@ -5,10 +5,9 @@ use crate::math::Rgb;
 /// The primary colours: of light of several colours, and where glass may colour it.
 pub const PRIMARIES: [Rgb; 3] = [Rgb::X, Rgb::Y, Rgb::Z];
 
-/// How many ratios are kept of light that has `own` colours where no glass colours it, and of which there are `colours` where
-/// glass may.
-pub fn ratio_count(own: usize, colours: usize) -> usize {
-    if own == 0 { 0 } else { own.max(colours) }
+/// How many ratios are kept of light that has `own` colours, one for each; three where glass may give it others.
+pub fn ratio_count(own: usize, is_coloured: bool) -> usize {
+    if is_coloured && own > 0 { PRIMARIES.len() } else { own }
 }
 
 /// The colours that so many ratios are of, of light that has the colours `own` where no glass colours it.
