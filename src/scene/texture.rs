@@ -1,9 +1,16 @@
 //! Images that materials show or take numbers from, with their mip levels.
 
+mod point_row;
+mod wrap;
+
+pub use point_row::PointRow;
+pub use wrap::Wrap;
+
 use crate::math::{DAffine2, DVec2, DVec3, Rgb, Vec2, Vec3, bulk, srgb_decode};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::sync::LazyLock;
+use wide::f32x4;
 
 /// Index into `Scene::textures`.
 pub type TextureId = u32;
@@ -62,17 +69,6 @@ pub struct TextureMap {
     pub transform: DAffine2,
 }
 
-/// What is seen beyond the edges of an image.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Wrap {
-    /// The image again.
-    Repeat,
-    /// The nearest texel of the edge.
-    Clamp,
-    /// The image again, every other one mirrored.
-    Mirror,
-}
-
 impl TextureMap {
     /// The image where the texture coordinates put it, repeated.
     pub fn of(image: u32) -> Self {
@@ -96,59 +92,13 @@ impl TextureMap {
     }
 }
 
-impl Wrap {
-    /// The coordinate from 0 to 1 where the image itself shows what is seen at `u`. What is no number, or too large to have a
-    /// fraction, counts as 0.
-    #[inline(always)] // Up to 32 times in a lookup.
-    fn inside(self, u: f32) -> f32 {
-        match self {
-            Self::Repeat => repeat(u),
-            Self::Clamp if u.is_nan() => 0.0,
-            Self::Clamp => u.clamp(0.0, 1.0),
-            Self::Mirror => {
-                let there_and_back = 2.0 * repeat(0.5 * u);
-                there_and_back.min(2.0 - there_and_back)
-            }
-        }
-    }
-
-    /// The two of `n` texels in a row between whose middles the coordinate `u` lies, and how far from the first; the row
-    /// goes from 0 to 1.
-    pub fn two_texels(self, u: f32, n: u32) -> (usize, usize, f32) {
-        self.two_inside(self.inside(u), n)
-    }
-
-    /// The same of what [`inside`](Self::inside) gave.
-    #[inline(always)] // Up to 64 times in a lookup.
-    fn two_inside(self, inside: f32, n: u32) -> (usize, usize, f32) {
-        let last = n as i32 - 1;
-        // From half a texel before the first one's middle to half a texel behind the last one's.
-        let place = inside * n as f32 + 0.5;
-        let second = place as i32;
-        let apart = place - second as f32;
-        let (before, behind) = if self == Self::Repeat { (last, 0) } else { (0, last) };
-        let first = if second > 0 { second - 1 } else { before };
-        let second = if second > last { behind } else { second };
-        (first as usize, second as usize, apart)
-    }
-}
-
-/// The fraction of a coordinate; 0 beyond f32's whole numbers, and of what is not a number.
-fn repeat(x: f32) -> f32 {
-    const WHOLE_FROM: f32 = 8_388_608.0;
-    if x.abs() < WHOLE_FROM { x - floor(x) } else { 0.0 }
-}
-
-/// The next whole number below `x`, which an `i32` holds. Not `f32::floor`, which is a call where the
-/// processor's instruction for it cannot be counted on.
-fn floor(x: f32) -> f32 {
-    let whole = x as i32 as f32;
-    if x < whole { whole - 1.0 } else { whole }
-}
-
 /// Linear values of the sRGB codes of 8 bits, rounded once.
 pub(super) static LINEAR: LazyLock<[f32; 256]> =
     LazyLock::new(|| std::array::from_fn(|code| srgb_decode(code as f64 / 255.0) as f32));
+
+/// What shares of 8 bits are divided by, and those of 16.
+const FULL8: f32 = 255.0;
+const FULL16: f32 = 65_535.0;
 
 /// The linear values between which a code is the nearest: from `BETWEEN[code - 1]` to `BETWEEN[code]`.
 static BETWEEN: LazyLock<[f32; 255]> =
@@ -254,31 +204,39 @@ impl Texture {
     pub fn mean(&self, wrap: [Wrap; 2], at: PointRow, (level, fraction): (usize, f32)) -> Rgb {
         let fine = &self.levels[level];
         let coarse = self.levels.get(level + 1).unwrap_or(fine);
-        let levels = [fine, coarse];
-        // Told apart once, lest each texel asks what it is.
-        match (&fine.texels, &coarse.texels) {
+        let grey = |share: f32| f32x4::splat(share);
+        let three = |[x, y, z]: [f32; 3]| f32x4::from([x, y, z, 0.0]);
+        // Told apart once, lest each texel asks what it is. Shares are divided once, too.
+        let (mean, full) = match (&fine.texels, &coarse.texels) {
             (Texels::Srgb(a), Texels::Srgb(b)) => {
                 let table: &[f32; 256] = &LINEAR;
-                let linear = |code: [u8; 3]| Rgb::from_array(code.map(|c| table[usize::from(c)]));
-                at.mean(levels, ([a, b], linear), wrap, fraction)
+                let linear = |[r, g, b]: &[u8; 3]| three([r, g, b].map(|c| table[usize::from(*c)]));
+                (at.mean([(fine, a), (coarse, b)], linear, wrap, fraction), 1.0)
             }
             (Texels::Linear(a), Texels::Linear(b)) => {
-                at.mean(levels, ([a, b], |value| value), wrap, fraction)
+                let linear = |value: &Rgb| three(value.to_array());
+                (at.mean([(fine, a), (coarse, b)], linear, wrap, fraction), 1.0)
             }
             (Texels::Data8(a), Texels::Data8(b)) => {
-                at.mean(levels, ([a, b], grey8), wrap, fraction)
+                let share = |share: &u8| grey((*share).into());
+                (at.mean([(fine, a), (coarse, b)], share, wrap, fraction), FULL8)
             }
             (Texels::Data16(a), Texels::Data16(b)) => {
-                at.mean(levels, ([a, b], grey16), wrap, fraction)
+                let share = |share: &u16| grey((*share).into());
+                (at.mean([(fine, a), (coarse, b)], share, wrap, fraction), FULL16)
             }
             (Texels::Vectors8(a), Texels::Vectors8(b)) => {
-                at.mean(levels, ([a, b], vector8), wrap, fraction)
+                let shares = |shares: &[u8; 3]| three(shares.map(f32::from));
+                (at.mean([(fine, a), (coarse, b)], shares, wrap, fraction), FULL8)
             }
             (Texels::Vectors16(a), Texels::Vectors16(b)) => {
-                at.mean(levels, ([a, b], vector16), wrap, fraction)
+                let shares = |shares: &[u16; 3]| three(shares.map(f32::from));
+                (at.mean([(fine, a), (coarse, b)], shares, wrap, fraction), FULL16)
             }
             _ => unreachable!("levels of one image are of one kind"),
-        }
+        };
+        let [red, green, blue, _] = mean.to_array();
+        Rgb::new(red, green, blue) / full
     }
 
     /// Bytes of all texels.
@@ -338,30 +296,10 @@ impl TextureLevel {
 
     /// What the level shows at the image's coordinates `uv`, between the middles of four texels.
     pub fn bilinear(&self, wrap: [Wrap; 2], uv: Vec2) -> Rgb {
-        let [columns, rows] = self.two_by_two(wrap, inside(wrap, uv));
-        let four = self.four([columns.0, columns.1], [rows.0, rows.1]);
-        mixed(four, columns.2, rows.2)
-    }
-
-    /// The columns and the rows of the four texels around what [`inside`] gives, and how far it is from the first of each.
-    #[inline(always)] // Up to 32 times in a lookup.
-    fn two_by_two(&self, wrap: [Wrap; 2], inside: Vec2) -> [(usize, usize, f32); 2] {
-        [wrap[0].two_inside(inside.x, self.width), wrap[1].two_inside(inside.y, self.height)]
-    }
-
-    /// As [`bilinear`](Self::bilinear), of `texels` of this level, which `linear` decodes.
-    #[inline(always)] // Up to 32 times in a lookup.
-    fn bilinear_of<T: Copy>(
-        &self,
-        (texels, linear): (&[T], impl Fn(T) -> Rgb),
-        wrap: [Wrap; 2],
-        inside: Vec2,
-    ) -> Rgb {
-        let [(left, right, x), (upper, lower, y)] = self.two_by_two(wrap, inside);
-        let width = self.width as usize;
-        let (upper, lower) = (upper * width, lower * width);
-        let four = [upper + left, upper + right, lower + left, lower + right];
-        mixed(four.map(|at| linear(texels[at])), x, y)
+        let (left, right, x) = wrap[0].two_texels(uv.x, self.width);
+        let (upper, lower, y) = wrap[1].two_texels(1.0 - uv.y, self.height);
+        let [a, b, c, d] = self.four([left, right], [upper, lower]);
+        a.lerp(b, x).lerp(c.lerp(d, x), y)
     }
 
     /// Texel number `at`, linear RGB or a grey of data.
@@ -369,10 +307,10 @@ impl TextureLevel {
         match &self.texels {
             Texels::Srgb(codes) => Rgb::from_array(codes[at].map(|c| LINEAR[usize::from(c)])),
             Texels::Linear(values) => values[at],
-            Texels::Data8(values) => grey8(values[at]),
-            Texels::Data16(values) => grey16(values[at]),
-            Texels::Vectors8(values) => vector8(values[at]),
-            Texels::Vectors16(values) => vector16(values[at]),
+            Texels::Data8(values) => Rgb::splat(f32::from(values[at])) / FULL8,
+            Texels::Data16(values) => Rgb::splat(f32::from(values[at])) / FULL16,
+            Texels::Vectors8(values) => Rgb::from_array(values[at].map(f32::from)) / FULL8,
+            Texels::Vectors16(values) => Rgb::from_array(values[at].map(f32::from)) / FULL16,
         }
     }
 
@@ -422,68 +360,6 @@ impl TextureLevel {
         };
         Some(Self::new(size.map(|n| n as u32), texels))
     }
-}
-
-/// Points of an image side by side.
-#[derive(Debug, Clone, Copy)]
-pub struct PointRow {
-    /// The image's coordinates of the first.
-    pub first: Vec2,
-    /// From each to the next.
-    pub step: Vec2,
-    /// How many.
-    pub count: u32,
-}
-
-impl PointRow {
-    /// See [`Texture::mean`]; `texels` of both levels, which `linear` decodes.
-    fn mean<T: Copy>(
-        self,
-        [fine, coarse]: [&TextureLevel; 2],
-        (texels, linear): ([&[T]; 2], impl Fn(T) -> Rgb + Copy),
-        wrap: [Wrap; 2],
-        fraction: f32,
-    ) -> Rgb {
-        let at = |point: u32| inside(wrap, self.first + self.step * point as f32);
-        let of = |level: &TextureLevel, texels, at| level.bilinear_of((texels, linear), wrap, at);
-        let mut sum = Rgb::ZERO;
-        if fraction == 0.0 {
-            (0..self.count).for_each(|point| sum += of(fine, texels[0], at(point)));
-        } else {
-            for at in (0..self.count).map(at) {
-                sum += of(fine, texels[0], at).lerp(of(coarse, texels[1], at), fraction);
-            }
-        }
-        sum / self.count as f32
-    }
-}
-
-/// Where the image itself shows what is seen at its coordinates `uv`: along its rows, and down its columns from the top.
-#[inline(always)] // Up to 16 times in a lookup.
-fn inside(wrap: [Wrap; 2], uv: Vec2) -> Vec2 {
-    Vec2::new(wrap[0].inside(uv.x), wrap[1].inside(1.0 - uv.y))
-}
-
-/// Between four texels, row by row: `x` from the left ones and `y` from the upper ones.
-#[inline(always)] // Up to 32 times in a lookup.
-fn mixed([a, b, c, d]: [Rgb; 4], x: f32, y: f32) -> Rgb {
-    a.lerp(b, x).lerp(c.lerp(d, x), y)
-}
-
-fn grey8(share: u8) -> Rgb {
-    Rgb::splat(f32::from(share) / 255.0)
-}
-
-fn grey16(share: u16) -> Rgb {
-    Rgb::splat(f32::from(share) / 65_535.0)
-}
-
-fn vector8(shares: [u8; 3]) -> Rgb {
-    Rgb::from_array(shares.map(f32::from)) / 255.0
-}
-
-fn vector16(shares: [u16; 3]) -> Rgb {
-    Rgb::from_array(shares.map(f32::from)) / 65_535.0
 }
 
 /// Which texels of a row each texel of a row half as long covers.
