@@ -108,7 +108,7 @@ impl Texture {
     /// A texture of `width · height` sRGB codes, row by row, and its mip levels. These are rounded to codes too.
     ///
     /// # Panics
-    /// Where there are not `width · height` texels, or none.
+    /// Where there are not `width · height` texels, or none, or more than 2²³ along an edge.
     pub fn from_srgb(name: impl Into<String>, size: [u32; 2], texels: Vec<[u8; 3]>) -> Self {
         Self::with_levels(name.into(), TextureLevel::new(size, Texels::Srgb(texels)))
     }
@@ -169,14 +169,13 @@ impl Texture {
     /// Whether nearly all texels, as they stand, are the shares of vectors that pass.
     fn are_mostly(&self, passes: impl Fn(Vec3) -> bool + Sync) -> bool {
         let is_normal = |shares: Rgb| passes(shares * 2.0 - Rgb::ONE);
-        let eight = |c: &[u8; 3]| is_normal(Rgb::from_array(c.map(f32::from)) / 255.0);
+        let eight = |c: &[u8; 3]| is_normal(Rgb::from_array(c.map(f32::from)) / FULL8);
         let (normals, all) = match &self.levels[0].texels {
             Texels::Srgb(codes) | Texels::Vectors8(codes) => {
                 (codes.par_iter().filter(|c| eight(c)).count(), codes.len())
             }
             Texels::Vectors16(codes) => {
-                let sixteen =
-                    |c: &[u16; 3]| is_normal(Rgb::from_array(c.map(f32::from)) / 65_535.0);
+                let sixteen = |c: &[u16; 3]| is_normal(Rgb::from_array(c.map(f32::from)) / FULL16);
                 (codes.par_iter().filter(|c| sixteen(c)).count(), codes.len())
             }
             Texels::Linear(values) => {
@@ -204,7 +203,6 @@ impl Texture {
     pub fn mean(&self, wrap: [Wrap; 2], at: PointRow, (level, fraction): (usize, f32)) -> Rgb {
         let fine = &self.levels[level];
         let coarse = self.levels.get(level + 1).unwrap_or(fine);
-        let grey = |share: f32| f32x4::splat(share);
         let three = |[x, y, z]: [f32; 3]| f32x4::from([x, y, z, 0.0]);
         // Told apart once, lest each texel asks what it is. Shares are divided once, too.
         let (mean, full) = match (&fine.texels, &coarse.texels) {
@@ -218,19 +216,19 @@ impl Texture {
                 (at.mean([(fine, a), (coarse, b)], linear, wrap, fraction), 1.0)
             }
             (Texels::Data8(a), Texels::Data8(b)) => {
-                let share = |share: &u8| grey((*share).into());
+                let share = |code: &u8| f32x4::splat((*code).into());
                 (at.mean([(fine, a), (coarse, b)], share, wrap, fraction), FULL8)
             }
             (Texels::Data16(a), Texels::Data16(b)) => {
-                let share = |share: &u16| grey((*share).into());
+                let share = |code: &u16| f32x4::splat((*code).into());
                 (at.mean([(fine, a), (coarse, b)], share, wrap, fraction), FULL16)
             }
             (Texels::Vectors8(a), Texels::Vectors8(b)) => {
-                let shares = |shares: &[u8; 3]| three(shares.map(f32::from));
+                let shares = |codes: &[u8; 3]| three(codes.map(f32::from));
                 (at.mean([(fine, a), (coarse, b)], shares, wrap, fraction), FULL8)
             }
             (Texels::Vectors16(a), Texels::Vectors16(b)) => {
-                let shares = |shares: &[u16; 3]| three(shares.map(f32::from));
+                let shares = |codes: &[u16; 3]| three(codes.map(f32::from));
                 (at.mean([(fine, a), (coarse, b)], shares, wrap, fraction), FULL16)
             }
             _ => unreachable!("levels of one image are of one kind"),
@@ -274,6 +272,7 @@ impl TextureLevel {
         };
         assert_eq!(count, width as usize * height as usize, "texels of a texture");
         assert!(count > 0, "a texture without texels");
+        assert!(width.max(height) <= 1 << 23, "texels along an edge of a texture");
         Self { width, height, texels }
     }
 
@@ -344,18 +343,18 @@ impl TextureLevel {
             Texels::Srgb(_) => Texels::Srgb(means.map(|mean| mean.to_array().map(code)).collect()),
             Texels::Linear(_) => Texels::Linear(means.collect()),
             Texels::Data8(_) => {
-                Texels::Data8(means.map(|mean| rounded(mean.x, 255.0) as u8).collect())
+                Texels::Data8(means.map(|mean| rounded(mean.x, FULL8) as u8).collect())
             }
             Texels::Vectors8(_) => {
-                let code = |mean: Vec3| mean.to_array().map(|c| rounded(c, 255.0) as u8);
+                let code = |mean: Vec3| mean.to_array().map(|c| rounded(c, FULL8) as u8);
                 Texels::Vectors8(means.map(code).collect())
             }
             Texels::Vectors16(_) => {
-                let code = |mean: Vec3| mean.to_array().map(|c| rounded(c, 65_535.0) as u16);
+                let code = |mean: Vec3| mean.to_array().map(|c| rounded(c, FULL16) as u16);
                 Texels::Vectors16(means.map(code).collect())
             }
             Texels::Data16(_) => {
-                Texels::Data16(means.map(|mean| rounded(mean.x, 65_535.0) as u16).collect())
+                Texels::Data16(means.map(|mean| rounded(mean.x, FULL16) as u16).collect())
             }
         };
         Some(Self::new(size.map(|n| n as u32), texels))
@@ -455,6 +454,71 @@ mod tests {
             }
             let last = texture.levels.last().expect("a level");
             assert_eq!((last.width, last.height), (1, 1));
+        }
+    }
+
+    /// A texture of every kind, of texels without a pattern.
+    fn of_every_kind(size: [u32; 2]) -> [Texture; 6] {
+        let count = size[0] * size[1];
+        let code = |i: u32, part: u32| ((3 * i + part).wrapping_mul(0x9e37_79b9) >> 16) as u16;
+        let three = |i: u32| [0, 1, 2].map(|part| code(i, part));
+        let three8 = |i: u32| three(i).map(|code| code as u8);
+        [
+            Texture::from_srgb("t", size, (0..count).map(three8).collect()),
+            Texture::from_linear(
+                "t",
+                size,
+                (0..count).map(|i| Rgb::from_array(three(i).map(f32::from)) / FULL16).collect(),
+            ),
+            Texture::from_data8("t", size, (0..count).map(|i| code(i, 0) as u8).collect()),
+            Texture::from_data16("t", size, (0..count).map(|i| code(i, 0)).collect()),
+            Texture::from_vectors8("t", size, (0..count).map(three8).collect()),
+            Texture::from_vectors16("t", size, (0..count).map(three).collect()),
+        ]
+    }
+
+    #[test]
+    fn the_mean_of_a_row_is_that_of_its_points() {
+        let (first, step) = (Vec2::new(-0.63, 0.91), Vec2::new(0.217, 0.344));
+        let wraps = [Wrap::Repeat, Wrap::Clamp, Wrap::Mirror];
+        for texture in of_every_kind([5, 3]) {
+            for (k, count) in (1..=9).enumerate() {
+                let wrap = [wraps[k % 3], wraps[(k + 1) % 3]];
+                for fraction in [0.0, 0.3, 1.0] {
+                    let point = |i: u32| {
+                        let at = |level: usize| {
+                            texture.levels[level].bilinear(wrap, first + step * i as f32)
+                        };
+                        at(0).lerp(at(1), fraction)
+                    };
+                    let wanted = (0..count).map(point).sum::<Rgb>() / count as f32;
+                    let row = PointRow { first, step, count };
+                    let found = texture.mean(wrap, row, (0, fraction));
+                    let off = (found - wanted).abs().max_element();
+                    assert!(off < 1e-6, "{} {count} {fraction}: {found} {wanted}", texture.kind());
+                }
+            }
+        }
+    }
+
+    /// Metal by an image of ones is no plastic at all, and asks for no light of plastic.
+    #[test]
+    fn the_mean_of_ones_is_one() {
+        let ones = [
+            Texture::from_data8("t", [2, 2], vec![255; 4]),
+            Texture::from_data16("t", [2, 2], vec![65_535; 4]),
+            Texture::from_vectors8("t", [2, 2], vec![[255; 3]; 4]),
+            Texture::from_vectors16("t", [2, 2], vec![[65_535; 3]; 4]),
+            Texture::from_srgb("t", [2, 2], vec![[255; 3]; 4]),
+        ];
+        for count in 1..=16 {
+            let row = PointRow { first: Vec2::splat(0.1), step: Vec2::splat(0.37), count };
+            for fraction in (0..1000).map(|i| (i as f32 / 1000.0).powi(2)) {
+                for texture in &ones {
+                    let mean = texture.mean([Wrap::Repeat; 2], row, (0, fraction));
+                    assert_eq!(mean, Rgb::ONE, "{} {count} {fraction}", texture.kind());
+                }
+            }
         }
     }
 

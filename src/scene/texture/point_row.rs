@@ -38,6 +38,8 @@ impl PointRow {
         wrap: [Wrap; 2],
         fraction: f32,
     ) -> f32x4 {
+        // Lest both shares, rounded, are more or less than 1 together: what is 1 in both levels is exactly 1.
+        let fraction = 1.0 - (1.0 - fraction);
         let mut sum = f32x4::ZERO;
         for from in (0..self.count).step_by(4) {
             let number = f32x4::from([0.0, 1.0, 2.0, 3.0]) + from as f32;
@@ -82,14 +84,14 @@ impl<'l, T> Four<'l, T> {
 
     #[inline(always)] // Up to 32 times in a lookup.
     fn bilinear(&self, lane: usize, decode: impl Fn(&T) -> f32x4) -> f32x4 {
-        let Self { texels, width, columns: [left, right], rows: [upper, lower], apart } = self;
+        let Self { texels, width, columns: [left, right], rows: [upper, lower], apart: [x, y] } =
+            self;
         let (left, right) = (left[lane] as usize, right[lane] as usize);
-        let (upper, lower) = (upper[lane] as usize * width, lower[lane] as usize * width);
-        let upper =
-            lerp(decode(&texels[upper + left]), decode(&texels[upper + right]), apart[0][lane]);
-        let lower =
-            lerp(decode(&texels[lower + left]), decode(&texels[lower + right]), apart[0][lane]);
-        lerp(upper, lower, self.apart[1][lane])
+        let across = |row: i32| {
+            let start = row as usize * width;
+            lerp(decode(&texels[start + left]), decode(&texels[start + right]), x[lane])
+        };
+        lerp(across(upper[lane]), across(lower[lane]), y[lane])
     }
 }
 

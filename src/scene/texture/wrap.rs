@@ -1,6 +1,6 @@
 //! What is seen beyond the edges of an image, and between which of its texels a coordinate lies.
 //!
-//! Four coordinates at a time: a lookup asks for up to 16 of them in two levels, and most of its time would go to this.
+//! Four coordinates at a time, since a lookup asks for up to 16 points in two mip levels.
 
 use serde::{Deserialize, Serialize};
 use wide::{CmpEq, CmpGt, CmpLt, f32x4, i32x4};
@@ -26,18 +26,19 @@ pub(super) struct Between {
 
 impl Wrap {
     /// The two of `n` texels in a row between whose middles the coordinate `u` lies, and how far from the first; the row
-    /// goes from 0 to 1.
+    /// goes from 0 to 1. `n` is at most 2²³.
     pub fn two_texels(self, u: f32, n: u32) -> (usize, usize, f32) {
         let Between { first, second, apart } = self.between(self.inside(f32x4::splat(u)), n);
         (first[0] as usize, second[0] as usize, apart[0])
     }
 
-    /// The coordinates from 0 to 1 where the image itself shows what is seen at `u`. What is no number, or too large to
-    /// have a fraction, counts as 0.
+    /// The coordinates from 0 to 1 where the image itself shows what is seen at `u`. What is no number counts as 0, and so
+    /// does what is too large to have a fraction where the image repeats.
     #[inline(always)] // Up to 8 times in a lookup.
     pub(super) fn inside(self, u: f32x4) -> f32x4 {
         match self {
             Self::Repeat => repeat(u),
+            // Of what is no number, processors make the one or the other.
             Self::Clamp => (u & u.cmp_eq(u)).fast_max(f32x4::ZERO).fast_min(f32x4::ONE),
             Self::Mirror => {
                 let there_and_back = repeat(u * 0.5) * 2.0;
@@ -122,18 +123,23 @@ mod tests {
                     };
                     assert!((f64::from(inside) - wanted).abs() < 1e-6, "{wrap:?} {u} {inside}");
                 }
-                for n in [1, 2, 3, 64, 1000] {
+                for n in [1_u32, 2, 3, 64, 1000, 65_536, 1 << 23] {
                     let between = wrap.between(f32x4::from(inside), n);
-                    for (lane, u) in lanes.into_iter().enumerate() {
-                        let alone = wrap.two_texels(u, n);
+                    for (lane, place) in
+                        inside.map(|inside| inside * n as f32 + 0.5).into_iter().enumerate()
+                    {
+                        let last = i64::from(n) - 1;
+                        let second = place.floor() as i64;
+                        let wrapped = |texel: i64| match wrap {
+                            Wrap::Repeat => texel.rem_euclid(i64::from(n)),
+                            Wrap::Clamp | Wrap::Mirror => texel.clamp(0, last),
+                        };
+                        let wanted = (wrapped(second - 1), wrapped(second), place - second as f32);
                         let (first, second) = (between.first[lane], between.second[lane]);
-                        assert_eq!(alone, (first as usize, second as usize, between.apart[lane]));
-                        let row = 0..n as i32;
-                        assert!(
-                            row.contains(&first) && row.contains(&second),
-                            "{wrap:?} {u} of {n}"
-                        );
-                        assert!((0.0..=1.0).contains(&between.apart[lane]), "{wrap:?} {u} of {n}");
+                        let found = (i64::from(first), i64::from(second), between.apart[lane]);
+                        assert_eq!(found, wanted, "{wrap:?} {} of {n}", lanes[lane]);
+                        let alone = wrap.two_texels(lanes[lane], n);
+                        assert_eq!(alone, (first as usize, second as usize, found.2));
                     }
                 }
             }
