@@ -2,6 +2,7 @@
 //! every machine decides alike.
 
 use super::evidence::{Evidence, Finding};
+use super::risk::is_direct;
 use crate::effects::EffectPlan;
 use crate::error::counted;
 use crate::inference::{Channel, Channels, SAMPLES_TOGETHER, check_rays};
@@ -75,7 +76,7 @@ pub fn channels(scene: &Scene, settings: &Settings) -> Channels {
         runs && plan.diffuse
             && is_worth(scene, expected_rays(channel, settings).saturating_mul(settings.spp))
     });
-    let cost = PointCost::of(scene, &kept, settings);
+    let cost = PointCost::of(scene, &kept, settings, direct_samples(settings));
     if cost.traced > cost.checked + cost.lookup {
         kept
     } else {
@@ -176,6 +177,12 @@ pub fn of_frame(rays: &RayCounts, lookups: u64) -> f64 {
     of_rays.iter().sum::<f64>() + LOOKUP * lookups as f64
 }
 
+/// Number of camera samples of a pixel that share a lookup where they see one surface directly. Each sample that a mirror
+/// or glass leads to a surface takes a lookup of its own.
+fn direct_samples(settings: &Settings) -> u32 {
+    settings.spp.min(SAMPLES_TOGETHER)
+}
+
 /// Costs of the light of one surface point, whose camera samples are shaded together.
 struct PointCost {
     /// Cost of tracing, in camera rays.
@@ -187,8 +194,8 @@ struct PointCost {
 }
 
 impl PointCost {
-    fn of(scene: &Scene, channels: &Channels, settings: &Settings) -> Self {
-        let samples = settings.spp.min(SAMPLES_TOGETHER);
+    /// Of a point of this many `samples`.
+    fn of(scene: &Scene, channels: &Channels, settings: &Settings, samples: u32) -> Self {
         let mean = scene.light_cells.as_ref().map(|cells| cells.mean()).unwrap_or_default();
         let MeanLights { area, tail_samples, .. } = mean;
         // Few points have as many lights as they have channels for.
@@ -228,12 +235,46 @@ pub fn is_worth_lookups<'f>(
     (scene, channels, settings): (&Scene, &Channels, &Settings),
     probed: f64,
 ) -> bool {
-    let cost = PointCost::of(scene, channels, settings);
-    let saved = |finding: &Finding| match (evidence.may_use(finding.level, 1.0), finding.agreed) {
-        (true, true) => cost.traced - cost.checked,
-        (true, false) => -cost.checked,
-        (false, _) => 0.0,
+    let of_samples = |samples| PointCost::of(scene, channels, settings, samples);
+    let (direct, specular) = (of_samples(direct_samples(settings)), of_samples(1));
+    let gain = |finding: &Finding| {
+        let cost = if is_direct(finding.level) { &direct } else { &specular };
+        let saved = match (evidence.may_use(finding.level, 1.0), finding.agreed) {
+            (true, true) => cost.traced - cost.checked,
+            (true, false) => -cost.checked,
+            (false, _) => 0.0,
+        };
+        saved - probed * cost.traced - cost.lookup
     };
-    let gain = |finding: &Finding| saved(finding) - probed * cost.traced - cost.lookup;
     findings.map(gain).sum::<f64>() > 0.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::{DVec3, Rgb};
+    use crate::reuse::risk::STEPS;
+    use crate::scene::{Light, Material, SphereLight, World, WorldSphere};
+
+    #[test]
+    fn lookups_of_single_samples_in_mirrors_pay_with_more_rays_than_those_of_pixels() {
+        let light =
+            Light::Sphere(SphereLight { centre: DVec3::Y, radius: 0.1, radiance: Rgb::ONE });
+        let mut world = World { lights: vec![light], ..World::default() };
+        let grey = world.add_material(Material::diffuse("grey", Rgb::splat(0.5)));
+        world.spheres.push(WorldSphere::new("room", DVec3::ZERO, 2.0, grey));
+        let scene = world.into_scene(true).expect("a scene");
+        let is_worth = |level: usize, count: usize, shadow_samples| {
+            let settings = Settings { spp: 4, shadow_samples, ..Settings::default() };
+            let channels = channels(&scene, &settings);
+            assert!(!channels.is_empty());
+            let exact = Finding { level: level as u8, agreed: true, error: 0.0, noise: 1.0 };
+            let findings = vec![exact; count];
+            let evidence = Evidence::of(findings.iter(), 0.25);
+            is_worth_lookups(&evidence, findings.iter(), (&scene, &channels, &settings), 0.01)
+        };
+        let (direct, specular) = (0, 2 * STEPS);
+        assert!(is_worth(direct, 100, 16) && !is_worth(specular, 100, 16));
+        assert!(is_worth(specular, 100, 256));
+    }
 }

@@ -73,6 +73,11 @@ pub fn shown(radiance: f32) -> f32 {
     (255.0 * srgb_encode(f64::from(radiance.clamp(0.0, 1.0)))) as f32
 }
 
+/// Whether `level` is one of points that camera rays end at, not rays from mirrors or glass.
+pub fn is_direct(level: u8) -> bool {
+    usize::from(level) < 2 * STEPS
+}
+
 /// The middle of the risks of `level`, display steps.
 pub fn risk_of(level: usize) -> f64 {
     let step = (level % STEPS) as f64;
@@ -121,6 +126,7 @@ mod tests {
         assert_eq!([5.9, 6.1].map(|risk| scale(even(risk))), [0, 1]);
         let specular = |risk| Features { is_direct: false, ..even(risk) };
         assert_eq!([5.9, 6.1].map(|risk| scale(specular(risk))), [2, 3]);
+        assert!(is_direct(even(6.1).level()) && !is_direct(specular(5.9).level()));
         // Where nothing differs there is nothing to tell apart.
         assert_eq!(Features { noise: 0.0, ..even(0.0) }.level(), 0);
     }
