@@ -25,6 +25,7 @@ pub fn text(sweeps: &[Sweep]) -> String {
     table(&mut out, "Intersection", sweeps, &intersection(), rules_cell);
     table(&mut out, "Sampling", sweeps, &sampling(), trade_cell);
     table(&mut out, "Reuse between frames", sweeps, &reuse(), trade_cell);
+    denoised(&mut out, sweeps);
     sweeps.iter().for_each(|sweep| scene(&mut out, sweep));
     out
 }
@@ -155,6 +156,25 @@ fn reuse() -> [Turned; 5] {
         ("`--tolerance 1`", |_| "--tolerance 1".into()),
         ("`--probes 0.03`", |_| "--probes 0.03".into()),
     ]
+}
+
+/// Frames behind a denoiser, where there was one.
+fn denoised(out: &mut String, sweeps: &[Sweep]) {
+    if !sweeps.iter().any(|s| s.denoised(None).is_some()) {
+        return;
+    }
+    head(out, "**Denoised by Intel Open Image Denoise**", sweeps);
+    let mut own = |name: &str, spp: &dyn Fn(&Sweep) -> Option<u64>| {
+        let cell = |s: &Sweep| s.denoised(spp(s)).map_or("–".into(), |row| trade_cell(s, row));
+        line(out, name, sweeps, cell);
+    };
+    own("the default's frames", &|_| None);
+    own("a quarter of the camera samples, traced with one sample of each light", &|s| {
+        Some((s.setting("spp") / 4).max(1))
+    });
+    own("as many", &|s| Some(s.setting("spp")));
+    own("four times as many", &|s| Some(4 * s.setting("spp")));
+    out.push('\n');
 }
 
 fn time(ratio: Option<Measured>) -> String {

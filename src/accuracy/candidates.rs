@@ -38,6 +38,9 @@ pub fn candidates(
     if takes(Group::Combinations) {
         list.combinations(plan);
     }
+    if takes(Group::Denoiser) {
+        list.denoised(plan);
+    }
     list.all
 }
 
@@ -52,8 +55,10 @@ impl List<'_> {
     fn add(&mut self, knob: Knob, options: String, turn: impl FnOnce(&mut Settings)) {
         let mut settings = self.base.clone();
         turn(&mut settings);
-        if self.all.iter().all(|other| other.settings != settings) {
-            self.all.push(Candidate { knob, options, settings });
+        let is_denoised = knob == Knob::Denoiser;
+        let mut same = self.all.iter().filter(|other| other.is_denoised == is_denoised);
+        if same.all(|other| other.settings != settings) {
+            self.all.push(Candidate { knob, options, settings, is_denoised });
         }
     }
 
@@ -235,6 +240,29 @@ impl List<'_> {
             });
         }
     }
+
+    /// The default's own frames, and traced ones with one sample of each light.
+    fn denoised(&mut self, plan: &EffectPlan) {
+        self.add(Knob::Denoiser, String::new(), |_| ());
+        let [less, more] = around(self.base.spp);
+        for spp in [less, self.base.spp, more] {
+            let mut settings = Settings { spp, most_spp: None, ..self.base.clone() };
+            let mut options = format!("--spp {spp}");
+            if plan.area_lights {
+                options += " --shadow-samples 1";
+                (settings.shadow_samples, settings.least_shadow_samples) = (1, None);
+            }
+            if plan.sky_light {
+                options += " --sky-samples 1";
+                (settings.sky_samples, settings.least_sky_samples) = (1, None);
+            }
+            if self.reuses(&settings) {
+                options += " --policy off";
+                settings.reuse.policy = Policy::Off;
+            }
+            self.add(Knob::Denoiser, options, |s| *s = settings);
+        }
+    }
 }
 
 /// `x` times `factor` in decimal digits: ten times 0.001 is 0.01, not 0.010000001.
@@ -263,13 +291,15 @@ mod tests {
         let all = candidates(&base, &EffectPlan::EVERYTHING, 100, &yes, &Group::ALL);
         assert_eq!((all[0].knob, &all[0].settings), (Knob::Default, &base));
         for (i, a) in all.iter().enumerate() {
-            assert!(all[..i].iter().all(|b| a.settings != b.settings), "{}", a.options);
+            let is_new =
+                |b: &Candidate| (&a.settings, a.is_denoised) != (&b.settings, b.is_denoised);
+            assert!(all[..i].iter().all(is_new), "{}", a.name());
         }
         let one = Settings { shadow_samples: 1, ..Settings::default() };
         let no_sky = EffectPlan { sky_light: false, ..EffectPlan::EVERYTHING };
         let list = candidates(&one, &no_sky, 100, &yes, &Group::ALL);
         for (i, a) in list.iter().enumerate() {
-            assert!(list[..i].iter().all(|b| a.options != b.options), "{}", a.options);
+            assert!(list[..i].iter().all(|b| a.name() != b.name()), "{}", a.name());
         }
         let nothing = EffectPlan {
             mirror: false,
@@ -319,6 +349,26 @@ mod tests {
                 .iter()
                 .all(|options| !options.ends_with(&format!("{MAX_SAMPLES}..{MAX_SAMPLES}")))
         );
+    }
+
+    #[test]
+    fn denoised_are_the_default_and_traced_frames_of_few_samples() {
+        let list = |base: &Settings, looks_up: bool| -> Vec<String> {
+            let looks_up = |_: &Settings| looks_up;
+            let everything = &EffectPlan::EVERYTHING;
+            let all = candidates(base, everything, 9, &looks_up, &[Group::Denoiser]);
+            assert!(all[1..].iter().all(|c| c.is_denoised && c.knob == Knob::Denoiser));
+            all.iter().map(Candidate::name).collect()
+        };
+        let base = Settings { spp: 4, ..Settings::default() };
+        let one = |spp| format!("--spp {spp} --shadow-samples 1 --sky-samples 1");
+        let expected = [1, 4, 16].map(|spp| one(spp) + " --policy off, denoised");
+        let list_of_base = list(&base, true);
+        assert_eq!(list_of_base[..2], ["default", "default, denoised"]);
+        assert_eq!(list_of_base[2..], expected);
+        let few = Settings { shadow_samples: 1, sky_samples: 1, ..base };
+        let expected = [1, 16].map(|spp| one(spp) + ", denoised");
+        assert_eq!(list(&few, false)[2..], expected, "four are the default's own");
     }
 
     #[test]

@@ -23,11 +23,13 @@ pub enum Group {
     Writing,
     /// Samples and reuse together.
     Combinations,
+    /// A denoiser, behind frames of few samples.
+    Denoiser,
 }
 
 impl Group {
     /// All groups.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Reuse,
         Self::Samples,
         Self::Specular,
@@ -36,6 +38,7 @@ impl Group {
         Self::Oracle,
         Self::Writing,
         Self::Combinations,
+        Self::Denoiser,
     ];
 }
 
@@ -81,6 +84,8 @@ pub enum Knob {
     Compact,
     /// Several knobs at once.
     Combination,
+    /// Denoised frames.
+    Denoiser,
 }
 
 impl Knob {
@@ -99,6 +104,7 @@ impl Knob {
             | Self::AllRules => Group::Intersection,
             Self::BuildQuality | Self::Compact => Group::Tree,
             Self::Combination => Group::Combinations,
+            Self::Denoiser => Group::Denoiser,
         })
     }
 
@@ -124,14 +130,17 @@ impl Knob {
             Self::BuildQuality => "Quality of Embree's tree",
             Self::Compact => "Compact tree",
             Self::Combination => "Combinations",
+            Self::Denoiser => "Denoiser",
         }
     }
 
     /// Whether the knob trades error for time, so that its settings may be recommended. Rules of
     /// intersection guard against rare wrong pixels, which no mean error shows; another tree changes next
-    /// to no pixel.
+    /// to no pixel; fewer probes save time and vouch for less; a denoiser is another program.
     pub fn is_ranked(self) -> bool {
-        !matches!(self.group(), Some(Group::Intersection | Group::Tree))
+        let group = self.group();
+        self != Self::Probes
+            && !matches!(group, Some(Group::Intersection | Group::Tree | Group::Denoiser))
     }
 }
 
@@ -144,4 +153,19 @@ pub struct Candidate {
     pub options: String,
     /// The complete settings that it is rendered with: the default's, changed by `options`.
     pub settings: Settings,
+    /// Whether its frames are denoised.
+    pub is_denoised: bool,
+}
+
+impl Candidate {
+    /// The setting's name.
+    pub fn name(&self) -> String {
+        name_of(&self.options, self.is_denoised)
+    }
+}
+
+/// The name of the setting of these options.
+pub(super) fn name_of(options: &str, is_denoised: bool) -> String {
+    let options = if options.is_empty() { "default" } else { options };
+    format!("{options}{}", if is_denoised { ", denoised" } else { "" })
 }

@@ -14,14 +14,13 @@
 //!
 //! A [`Ledger`] keeps the measurements of a sweep on disk, trial by trial, so that a sweep that was
 //! stopped or killed goes on.
-//!
-//! Not done: knobs that the program does not have (texture filters).
 
 mod candidates;
 mod change;
 mod check;
 mod choice;
 mod context;
+mod denoiser;
 mod draw;
 mod effort;
 mod error_model;
@@ -52,6 +51,7 @@ pub use candidates::candidates;
 pub use check::{CheckOutcome, CheckedFrame, Verdict};
 pub use choice::{Goal, best_within, fastest_reaching, perhaps_faster};
 pub use context::TrialContext;
+pub use denoiser::Denoiser;
 pub use effort::Effort;
 pub use error_model::SampleCounts;
 pub use errors::{Errors, displayed_rgb};

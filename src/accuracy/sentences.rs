@@ -25,7 +25,7 @@ fn sentence(default: &CandidateRow, row: &CandidateRow) -> String {
     let samples = row.camera_samples.map_or(String::new(), |mean| {
         format!("; {} camera samples a pixel in the mean", short(mean))
     });
-    format!("{}: {}, {what}{samples}.", row.options, time(row))
+    format!("{}: {}, {what}{samples}.", row.name(), time(row))
 }
 
 /// What its tree takes.

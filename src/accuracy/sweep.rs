@@ -7,6 +7,7 @@
 
 use super::change::Change;
 use super::context::TrialContext;
+use super::denoiser::Denoiser;
 use super::errors::Errors;
 use super::knobs::Candidate;
 use super::ledger::{Ledger, TrialRecord};
@@ -29,6 +30,8 @@ pub struct Sweep<'a> {
     pub frames: &'a [u32],
     /// Turns that are timed; one more comes before them.
     pub turns: u32,
+    /// What denoises the frames of candidates that ask for it.
+    pub denoiser: Option<&'a Denoiser>,
 }
 
 /// A candidate is about to be tried.
@@ -74,13 +77,13 @@ impl Sweep<'_> {
             // A range comes near to the error of its upper end.
             samples(&Settings { spp: s.most_camera_samples(), most_spp: None, ..s.clone() })
         };
-        let best = self.candidates.iter().max_by_key(most);
+        let noisy = self.candidates.iter().filter(|c| !c.is_denoised);
+        let best = noisy.max_by_key(most);
         let Some(best) = best else { return Ok(0.0) };
         let frame = [self.shown_frame()];
         let mut frames = Vec::new();
         for turn in 0..2 {
-            let settings = self.with_seed(best, turn);
-            frames.push(self.try_one(&settings, &frame)?.trial.frames);
+            frames.push(self.try_one(best, turn, &frame)?.trial.frames);
         }
         Ok(super::errors::rms_between(&frames[0], &frames[1]) / 2f64.sqrt())
     }
@@ -105,7 +108,7 @@ impl Sweep<'_> {
             }
             if turn > 0 && !is_warm {
                 self.heard(ledger, turn, 0, hear)?;
-                self.try_one(&self.with_seed(&self.candidates[0], turn), self.frames)?;
+                self.try_one(&self.candidates[0], turn, self.frames)?;
             }
             is_warm = true;
             self.turn(truth, ledger, turn, &open, hear)?;
@@ -125,13 +128,13 @@ impl Sweep<'_> {
         // The default goes first, also where an earlier run has had its turn: the others' pixels and
         // times are compared with its.
         self.heard(ledger, turn, 0, hear)?;
-        let default = self.try_one(&self.with_seed(&self.candidates[0], turn), self.frames)?;
+        let default = self.try_one(&self.candidates[0], turn, self.frames)?;
         for candidate in open {
             let own = match *candidate {
                 0 => None,
                 k => {
                     self.heard(ledger, turn, k, hear)?;
-                    Some(self.try_one(&self.with_seed(&self.candidates[k], turn), self.frames)?)
+                    Some(self.try_one(&self.candidates[k], turn, self.frames)?)
                 }
             };
             let tried = own.as_ref().unwrap_or(&default);
@@ -215,13 +218,11 @@ impl Sweep<'_> {
         Some((measured, pictures))
     }
 
-    fn with_seed(&self, candidate: &Candidate, turn: u32) -> Settings {
-        let seed = seed_of_turn(self.context.base.seed, turn);
-        Settings { seed, ..candidate.settings.clone() }
-    }
-
-    fn try_one(&self, settings: &Settings, frames: &[u32]) -> Result<Tried> {
+    fn try_one(&self, candidate: &Candidate, turn: u32, frames: &[u32]) -> Result<Tried> {
         let start = Instant::now();
+        let seed = seed_of_turn(self.context.base.seed, turn);
+        let settings = &Settings { seed, ..candidate.settings.clone() };
+        let denoiser = self.denoiser.filter(|_| candidate.is_denoised);
         // Other rules build another tree, one at a time: several would not fit beside a large scene.
         let own = self.context.own_intersector(settings)?;
         let build_seconds = match own {
@@ -229,7 +230,7 @@ impl Sweep<'_> {
             None => self.context.build_seconds,
         };
         let intersector = own.as_deref().map_or(self.context.intersector, |own| own as _);
-        let trial = trial::run(self.context, settings, intersector, frames)?;
+        let trial = trial::run(self.context, settings, intersector, denoiser, frames)?;
         let entry = TrialRecord {
             seconds: trial.seconds,
             cpu_seconds: trial.cpu_seconds,

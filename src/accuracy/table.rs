@@ -45,6 +45,7 @@ pub(super) mod tests {
             knob: *knob,
             options: (*options).into(),
             settings: Settings::default(),
+            is_denoised: false,
         };
         let default = list[0].2;
         let taken = |(.., seconds, rmse): &(Knob, &str, f64, f64)| {
@@ -80,11 +81,13 @@ pub(super) mod tests {
             (Knob::CameraSamples, "--spp 16", 4.0, 1.0),
             (Knob::ShadowSamples, "--shadow-samples 64", 4.0, 1.5),
             (Knob::Retry, "--retry off", 0.9, 2.0),
+            (Knob::Probes, "--probes 0.003", 0.9, 2.0),
+            (Knob::Denoiser, "--spp 1", 0.9, 1.0),
             (Knob::Policy, "--policy off", 3.0, 1.0),
             (Knob::Tolerance, "--tolerance 2", 1.0, 2.0),
         ]);
         let front: Vec<bool> = measured.rows.iter().map(|row| row.on_front).collect();
-        assert_eq!(front, [true, false, false, false, true, false]);
+        assert_eq!(front, [true, false, false, false, false, false, true, false]);
         let ratio = measured.rows[1].time_ratio.expect("timed");
         assert!(ratio.interval.estimate == 4.0 && ratio.differs_from(1.0));
         assert!(measured.default_row().time_ratio.is_none());

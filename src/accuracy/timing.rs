@@ -123,7 +123,7 @@ impl SettingsProbe<'_> {
         let mut settings = settings.clone();
         (settings.width, settings.height) = self.small_size(pixels);
         let frames = timed_frames(self.context.shot.frames);
-        let trial = trial::run(self.context, &settings, self.context.intersector, &frames)?;
+        let trial = trial::run(self.context, &settings, self.context.intersector, None, &frames)?;
         Ok(Times { wall: trial.seconds, cpu: trial.cpu_seconds })
     }
 }

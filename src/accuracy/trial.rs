@@ -1,6 +1,7 @@
 //! One candidate, one turn: its frames, made and timed.
 
 use super::context::TrialContext;
+use super::denoiser::Denoiser;
 use super::errors::{Frames, displayed};
 use super::frames::Cut;
 use crate::error::Result;
@@ -11,6 +12,7 @@ use crate::scene::{Policy, Settings};
 use crate::sequence::{ColourMaker, FrameContext, FrameMaker, Made, Pyramid, SurfaceReuse, Tracer};
 use crate::shade::Renderer;
 use crate::stats::RayCounts;
+use nix::sys::resource::UsageWho;
 use std::time::Instant;
 
 /// What came of a trial: means over the move, per frame.
@@ -21,7 +23,7 @@ pub struct Trial {
     pub cut: Cut,
     /// Wall seconds.
     pub seconds: f64,
-    /// CPU seconds of this process, all threads together.
+    /// CPU seconds of this process, all threads together, and of the denoiser's.
     pub cpu_seconds: f64,
     /// Rays by kind, the audit's among them, of all frames that were made.
     pub rays: RayCounts,
@@ -33,21 +35,22 @@ pub struct Trial {
     pub memory: u64,
 }
 
-/// Makes `chosen` frames under `settings`, and what they are inferred from.
+/// Makes `chosen` frames under `settings`, and what they are inferred from; all denoised if there is a `denoiser`.
 ///
 /// # Errors
-/// [`Stopped`](crate::error::Error::Stopped); those of cameras.
+/// [`Stopped`](crate::error::Error::Stopped); those of cameras and of the denoiser.
 pub fn run(
     context: &TrialContext,
     settings: &Settings,
     intersector: &dyn Intersector,
+    denoiser: Option<&Denoiser>,
     chosen: &[u32],
 ) -> Result<Trial> {
     let scene = context.scene_of(settings);
     let renderer = Renderer::new(scene, settings, intersector);
     let looks_up = !reuse::channels(scene, settings).is_empty();
     let cut = Cut::of(settings, context.shot.frames, looks_up);
-    let maker = maker(context, renderer, settings)?;
+    let maker = maker(context, renderer, settings, denoiser.is_some())?;
     let order = maker.batches(&cut.with_ancestors(chosen)).concat();
     maker.expect(&order);
     let mut frames = Frames::new();
@@ -56,7 +59,11 @@ pub fn run(
     let mut all_rays = RayCounts::default();
     for frame in order {
         let (start, cpu_start) = (Instant::now(), cpu_now());
-        let made = maker.make(frame)?;
+        let mut made = maker.make(frame)?;
+        if let Some(denoiser) = denoiser {
+            let threads = context.pool.current_num_threads();
+            made.film.rgb = denoiser.denoise(&made.film, threads, context.stop)?;
+        }
         seconds.push((frame, start.elapsed().as_secs_f64()));
         cpu.push((frame, cpu_now() - cpu_start));
         let cast = rays_of(&made);
@@ -90,10 +97,11 @@ fn maker<'m>(
     context: &TrialContext<'m>,
     renderer: Renderer<'m>,
     settings: &Settings,
+    with_gbuffer: bool,
 ) -> Result<Box<dyn FrameMaker + 'm>> {
     let TrialContext { shot, pool, stop, .. } = *context;
     let progress = &();
-    let context = FrameContext { renderer, shot, pool, with_gbuffer: false, stop, progress };
+    let context = FrameContext { renderer, shot, pool, with_gbuffer, stop, progress };
     Ok(match settings.reuse.policy {
         Policy::Surface => {
             let pyramid = Pyramid { segment: settings.reuse.segment, frames: shot.frames };
@@ -106,8 +114,14 @@ fn maker<'m>(
     })
 }
 
-/// CPU seconds of this process so far.
+/// CPU seconds of this process so far, and of the programs that it has run.
 pub fn cpu_now() -> f64 {
     let now = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
-    now.tv_sec as f64 + now.tv_nsec as f64 * 1e-9
+    let others = nix::sys::resource::getrusage(UsageWho::RUSAGE_CHILDREN).map_or(0.0, |usage| {
+        [usage.user_time(), usage.system_time()]
+            .map(|time| time.tv_sec() as f64 + time.tv_usec() as f64 * 1e-6)
+            .iter()
+            .sum()
+    });
+    now.tv_sec as f64 + now.tv_nsec as f64 * 1e-9 + others
 }

@@ -11,8 +11,8 @@ use super::exit::Exit;
 use super::signals::Interrupt;
 use super::{job, machine, say, values};
 use crate::accuracy::{
-    self, Candidate, CandidatePicture, Group, Ledger, Measured, OracleCrop, Sweep, TrialContext,
-    Truth, Writing,
+    self, Candidate, CandidatePicture, Denoiser, Group, Ledger, Measured, OracleCrop, Sweep,
+    TrialContext, Truth, Writing,
 };
 use crate::cluster;
 use crate::effects::EffectPlan;
@@ -67,11 +67,15 @@ pub struct AccuracyArgs {
     #[arg(long, value_name = "N", default_value_t = 1024, allow_negative_numbers = true,
         value_parser = whole(64, MAX_SAMPLES))]
     reference_spp: u32,
-    /// Options to vary: reuse, samples, specular, intersection, tree, oracle, writing, combinations
+    /// Options to vary: reuse, samples, specular, intersection, tree, oracle, writing, combinations, denoiser
     /// [default: all]
     #[arg(long, value_name = "LIST", value_delimiter = ',',
-        value_parser = values::choice::<Group>(&["reuse", "samples", "specular", "intersection", "tree", "oracle", "writing", "combinations"]))]
+        value_parser = values::choice::<Group>(&["reuse", "samples", "specular", "intersection", "tree", "oracle", "writing", "combinations", "denoiser"]))]
     knobs: Vec<Group>,
+    /// Program oidnDenoise of Intel Open Image Denoise, which frames of few samples are denoised with
+    /// [default: oidnDenoise, if it is installed]
+    #[arg(long, value_name = "PROGRAM")]
+    denoiser: Option<PathBuf>,
     /// Measure everything anew, whatever the folder holds
     #[arg(long)]
     overwrite: bool,
@@ -100,6 +104,9 @@ struct Outcome<'a> {
     pictures: Vec<CandidatePicture>,
     oracle: Option<OracleCrop>,
     oracle_was_wanted: bool,
+    /// The denoiser that frames were given to.
+    denoiser: Option<String>,
+    lacks_denoiser: bool,
     writing: Option<Writing>,
     frames: &'a [u32],
     shown_frame: u32,
@@ -137,7 +144,11 @@ pub fn run(args: &AccuracyArgs) -> Result<Exit> {
     }
     atomic::make_room(args.output.join("report.html"))?;
     let frames = frames(args, shot.frames)?;
-    let groups = if args.knobs.is_empty() { Group::ALL.to_vec() } else { args.knobs.clone() };
+    let mut groups = if args.knobs.is_empty() { Group::ALL.to_vec() } else { args.knobs.clone() };
+    let denoiser = denoiser(args, &groups)?;
+    let lacks_denoiser = denoiser.is_none() && groups.contains(&Group::Denoiser);
+    groups.retain(|group| *group != Group::Denoiser);
+    groups.extend(denoiser.as_ref().map(|_| Group::Denoiser));
     let hash = fingerprint(&world, &shot);
     // Rounded twice, about the scene's own centre and not, where that is compared.
     let otherwise = groups.contains(&Group::Intersection).then(|| world.clone());
@@ -159,8 +170,13 @@ pub fn run(args: &AccuracyArgs) -> Result<Exit> {
         pool: &pool,
         stop: &interrupt.stop,
     };
-    let sweep =
-        Sweep { context: &context, candidates: &candidates, frames: &frames, turns: args.turns };
+    let sweep = Sweep {
+        context: &context,
+        candidates: &candidates,
+        frames: &frames,
+        turns: args.turns,
+        denoiser: denoiser.as_ref(),
+    };
     let terms = terms(args, &sweep, &hash);
     let ledger = Ledger::open(&args.output.join("sweep"), &terms, args.overwrite)?;
     let oracle_was_wanted = groups.contains(&Group::Oracle);
@@ -173,23 +189,45 @@ pub fn run(args: &AccuracyArgs) -> Result<Exit> {
         line: line::ProgressLine::new(args.quiet),
         oracle_was_wanted,
         writing_is_wanted: groups.contains(&Group::Writing),
+        lacks_denoiser,
         load: machine::load(),
         start,
     };
     job.run(ledger)
 }
 
+/// The denoiser that was asked for, or one that is there and runs where none was; `None` where none is wanted.
+fn denoiser(args: &AccuracyArgs, groups: &[Group]) -> Result<Option<Denoiser>> {
+    if args.denoiser.is_none() && !groups.contains(&Group::Denoiser) {
+        return Ok(None);
+    }
+    let program = args.denoiser.clone().unwrap_or("oidnDenoise".into());
+    let is_asked_for = args.denoiser.is_some() || args.knobs.contains(&Group::Denoiser);
+    let found = match Denoiser::find(&program) {
+        Err(_) if !is_asked_for => None,
+        found => found?,
+    };
+    if found.is_none() && is_asked_for {
+        return Err(Error::Usage(format!(
+            "there is no program {}, which denoised frames need\n  help: install Intel Open Image Denoise, and give the \
+             path of its program with --denoiser",
+            program.display()
+        )));
+    }
+    Ok(found)
+}
+
 /// Everything that the figures depend on, by name; a sweep resumes only if it is equal.
 fn terms(args: &AccuracyArgs, sweep: &Sweep, hash: &str) -> Map<String, Value> {
     let context = sweep.context;
-    let options: Vec<&str> = sweep.candidates.iter().map(|c| c.options.as_str()).collect();
+    let names: Vec<String> = sweep.candidates.iter().map(Candidate::name).collect();
     let mut terms = Map::new();
     if let Value::Object(settings) = Header::settings(context.base) {
         terms.extend(settings.into_iter().map(|(name, value)| (name.replace('_', "-"), value)));
     }
     let others = [
         ("frames", json!(sweep.frames)),
-        ("settings to compare", json!(options)),
+        ("settings to compare", json!(names)),
         ("reference-spp", json!(args.reference_spp)),
         ("threads", json!(context.pool.current_num_threads())),
         ("scene content", json!(hash)),
@@ -198,6 +236,7 @@ fn terms(args: &AccuracyArgs, sweep: &Sweep, hash: &str) -> Map<String, Value> {
         ("machine", json!(machine::Machine::here().cpu)),
     ];
     terms.extend(others.map(|(name, value)| (name.to_string(), value)));
+    terms.extend(sweep.denoiser.map(|d| ("denoiser".to_string(), json!(d.describe()))));
     terms
 }
 

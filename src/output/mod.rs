@@ -20,6 +20,7 @@
 //! Not done: cropped files' data windows; exr compressions other than ZIP when writing.
 
 pub mod atomic;
+pub(crate) mod child;
 mod display;
 pub mod exr;
 mod format;

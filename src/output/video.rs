@@ -10,19 +10,16 @@
 //! [`command`] for exr frames uses ffmpeg's own conversion: the sRGB curve, no exposure.
 
 use super::atomic::Temporary;
+use super::child::{Ran, watch};
 use super::{Display, Format, FramePattern, read_image};
 use crate::error::{Error, Result};
 use crate::film::Image;
 use std::ffi::OsStr;
 use std::fs::File;
-use std::io::{self, Read, Write};
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, Command, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
-
-/// Pause between two checks whether ffmpeg has ended or is to be stopped.
-const NAP: Duration = Duration::from_millis(5);
 
 /// The frames of a video.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -99,7 +96,7 @@ fn make_with(program: &OsStr, clip: &Clip, out: &Path, stop: &AtomicBool) -> Res
         // A signal to the whole group ended ffmpeg, too.
         return match stop.load(Ordering::Relaxed) {
             true => Err(Error::Stopped),
-            false => Ok(Video::Failed { stderr: tail(&run.stderr) }),
+            false => Ok(Video::Failed { stderr: run.last_words() }),
         };
     }
     let synced = File::open(temporary.path()).and_then(|f| f.sync_all());
@@ -169,42 +166,10 @@ fn plain_file(path: &Path) -> String {
     text.into_owned()
 }
 
-/// The result of running ffmpeg.
-struct Ran {
-    is_done: bool,
-    stderr: Vec<u8>,
-}
-
 fn start(program: &OsStr, args: Vec<String>, stdin: Stdio) -> Result<Child> {
     let mut ffmpeg = Command::new(program);
     ffmpeg.args(args).stdin(stdin).stdout(Stdio::null()).stderr(Stdio::piped());
     ffmpeg.spawn().map_err(|e| Error::io("run", program, e))
-}
-
-/// Waits for `child`, and kills it when `stop` is set. Reads its stderr meanwhile, since a full pipe would block
-/// it.
-fn watch(child: &mut Child, stop: &AtomicBool) -> io::Result<Ran> {
-    let said = child.stderr.take();
-    let reader = std::thread::spawn(move || {
-        let mut stderr = Vec::new();
-        // Half of its words are better than none.
-        let _ = said.map(|mut said| said.read_to_end(&mut stderr));
-        stderr
-    });
-    let mut is_killed = false;
-    let status = loop {
-        if let Some(status) = child.try_wait()? {
-            break status;
-        }
-        if stop.load(Ordering::Relaxed) {
-            child.kill()?;
-            is_killed = true;
-        }
-        std::thread::sleep(NAP);
-    };
-    // One that was killed may leave another behind, as a script does, that holds the pipe open.
-    let stderr = if is_killed { Vec::new() } else { reader.join().unwrap_or_default() };
-    Ok(Ran { is_done: status.success(), stderr })
 }
 
 /// Runs ffmpeg on display values that this process pipes to it.
@@ -252,14 +217,6 @@ fn feed(mut stdin: ChildStdin, clip: &Clip, first: Image, stop: &AtomicBool) -> 
         stdin.write_all(&bytes).map_err(|e| Error::io("pipe to ffmpeg", path, e))?;
     }
     Ok(())
-}
-
-/// The last lines, at most some 1,000 characters.
-fn tail(stderr: &[u8]) -> String {
-    let text = String::from_utf8_lossy(stderr);
-    let text = text.trim();
-    let skip = text.chars().count().saturating_sub(1000);
-    text.chars().skip(skip).collect()
 }
 
 #[cfg(test)]

@@ -41,6 +41,53 @@ fn assert_same(job: &Job, a: &str, b: &str) {
 }
 
 #[test]
+fn denoised_frames_stand_beside_those_that_are_not() {
+    let job = Job::new();
+    // By another process: a program that is open for writing here does not run.
+    let program = |name: &str, script: &str| {
+        let help = "[ $1 = --help ] && echo Open Image Denoise && exit";
+        let mut write = Command::new("sh");
+        write.args(["-c", r#"printf %s "$1" > "$0" && chmod +x "$0""#]).arg(job.path(name));
+        let status = write.arg(format!("#!/bin/sh\n{help}\n{script}\n")).status();
+        assert!(status.expect("a shell").success());
+    };
+    // Options: --hdr COLOUR --alb ALBEDO --nrm NORMAL --device cpu --threads 1 -o OUT.
+    program("colour", "cp $2 ${12}");
+    program("albedo", "i=0; while [ $i -lt 100000 ]; do i=$((i+1)); done; cp $4 ${12}");
+    let line =
+        "accuracy cube.obj --size 16x12 --frames 1,2 --turns 1 --reference-spp 64 --threads 1";
+    let defaults = |denoiser: &str| {
+        let options = format!("--knobs denoiser --denoiser ./{denoiser} -o o_{denoiser} -q");
+        job.done(&format!("{line} {options}"));
+        let rows = json(&job, &format!("o_{denoiser}"))["rows"].as_array().expect("rows").clone();
+        [false, true].map(|is_denoised| {
+            let is_meant = |row: &&Value| row["options"] == "" && row["is_denoised"] == is_denoised;
+            rows.iter().find(is_meant).expect("a row").clone()
+        })
+    };
+    let [noisy, denoised] = defaults("colour");
+    assert_eq!(noisy["errors"], denoised["errors"]);
+    let [noisy, denoised] = defaults("albedo");
+    let rmse = |row: &Value| row["errors"]["rmse_steps"].as_f64().expect("a figure");
+    assert!(rmse(&denoised) > rmse(&noisy) + 1.0, "its picture counts");
+    let cpu = |row: &Value| row["cpu_seconds"]["estimate"].as_f64().expect("a figure");
+    assert!(cpu(&denoised) > cpu(&noisy) + 0.02, "its time counts");
+    let page = String::from_utf8(job.read("o_colour/report.html")).expect("text");
+    assert!(page.contains("default, denoised") && page.contains("--aovs albedo,normal"));
+
+    job.refused(&format!("{line} --knobs denoiser --denoiser no-such -o p"), "no-such");
+    job.refused(&format!("{line} --denoiser true -o p"), "is not oidnDenoise");
+    // Another denoiser makes another sweep.
+    let other = format!("{line} --knobs denoiser --denoiser ./albedo -o o_colour");
+    job.refused(&other, "denoiser was");
+    // Where no option asks for one, the page says what is missing.
+    let mut all = job.command(&format!("{line} -o q -q"));
+    assert!(all.env("PATH", "").status().expect("it starts").success());
+    let page = String::from_utf8(job.read("q/report.html")).expect("text");
+    assert!(page.contains("Left out: oidnDenoise"));
+}
+
+#[test]
 fn a_sweep_that_is_killed_again_and_again_measures_what_a_whole_one_does() {
     let job = Job::new();
     let start = Instant::now();

@@ -31,6 +31,8 @@ struct Document<'a> {
     runs: u32,
     default: Value,
     reference: Reference,
+    /// Path of the denoiser's program and hash of its file, if frames were denoised.
+    denoiser: Option<&'a str>,
     rows: &'a [CandidateRow],
     oracle: Option<OracleCrop>,
     writing: Option<Writing>,
@@ -68,6 +70,7 @@ pub fn write(args: &AccuracyArgs, outcome: &Outcome, command: &[String]) -> Resu
             change: truth.change,
             wanted: truth.wanted,
         },
+        denoiser: outcome.denoiser.as_deref(),
         rows: &outcome.measured.rows,
         oracle: outcome.oracle,
         writing: outcome.writing,

@@ -3,7 +3,7 @@
 use super::line::ProgressLine;
 use super::{AccuracyArgs, Outcome, files, page};
 use crate::accuracy::{
-    self, Convergence, Ledger, OracleCrop, Step, Sweep, SweepProgress, Truth, Writing,
+    self, Convergence, Denoiser, Ledger, OracleCrop, Step, Sweep, SweepProgress, Truth, Writing,
 };
 use crate::cli::exit::Exit;
 use crate::cli::progress::duration;
@@ -31,6 +31,8 @@ pub struct SweepJob<'a> {
     pub line: ProgressLine,
     pub oracle_was_wanted: bool,
     pub writing_is_wanted: bool,
+    /// Whether denoised frames are left out since there is no denoiser.
+    pub lacks_denoiser: bool,
     /// Load of the machine over the minute before the start.
     pub load: Option<f64>,
     /// When the program began.
@@ -101,7 +103,7 @@ impl SweepJob<'_> {
     fn heard(&self, heard: &SweepProgress) {
         let SweepProgress { done, of, turn, candidate, left, .. } = heard;
         let turn = if *turn == 0 { "warm-up".into() } else { format!("turn {turn}") };
-        let name = page::name_of(&candidate.options);
+        let name = candidate.name();
         let text = format!("{} of {of}  {turn}  {name}", (done + 1).min(*of));
         let share = left.map_or(0.0, |left| self.line.seconds() / (self.line.seconds() + left));
         self.line.tell(&text, share, *left);
@@ -167,6 +169,8 @@ impl SweepJob<'_> {
             pictures,
             oracle: ledger.note(ORACLE).flatten(),
             oracle_was_wanted: self.oracle_was_wanted,
+            denoiser: sweep.denoiser.map(Denoiser::describe),
+            lacks_denoiser: self.lacks_denoiser,
             writing: ledger.note(WRITING).filter(|_| self.writing_is_wanted),
             shown_frame: sweep.shown_frame(),
             frames: sweep.frames,

@@ -47,11 +47,6 @@ pub fn page(args: &AccuracyArgs, outcome: &Outcome, command: &[String]) -> Resul
     })
 }
 
-/// A candidate's name.
-pub fn name_of(options: &str) -> String {
-    if options.is_empty() { "default".into() } else { options.into() }
-}
-
 fn median_of(row: &CandidateRow) -> f64 {
     row.seconds.median.interval.estimate
 }
@@ -74,7 +69,7 @@ fn summary(outcome: &Outcome) -> Vec<String> {
     if let Some(row) = half.filter(is_timed).filter(|row| beyond_noise(&row.error_ratio)) {
         lines.push(format!(
             "{} is more accurate in the same time: {}/255.",
-            row.options,
+            row.name(),
             short(row.errors.rmse_steps)
         ));
     }
@@ -82,13 +77,13 @@ fn summary(outcome: &Outcome) -> Vec<String> {
     let Some(row) = fastest_reaching(&outcome.measured, goal) else { return lines };
     if row.knob != Knob::Default {
         let share = percent(median_of(row) / time);
-        lines.push(format!("{} is as accurate in {share} of the time.", row.options));
+        lines.push(format!("{} is as accurate in {share} of the time.", row.name()));
     }
     if let Some(row) = perhaps_faster(&outcome.measured, goal, row) {
         lines.push(format!(
             "{} may be as accurate in less time, but {} turns are too few to distinguish that from noise: \
              about 6 --turns are needed.",
-            row.options,
+            row.name(),
             row.seconds.turns.len()
         ));
     }
@@ -107,7 +102,8 @@ fn facts(outcome: &Outcome, given: &[Given]) -> Vec<(String, String)> {
     };
     let turns = times.turns.len();
     let fact = |name: &str, value: String| (name.to_string(), value);
-    vec![
+    let denoiser = outcome.denoiser.iter().map(|d| fact("Denoiser", d.clone()));
+    let facts = vec![
         fact("Default", shell_line(&with_given(given, &default))),
         fact("Size", format!("{} × {}", base.width, base.height)),
         fact("Frames looked at", format!("{} of {}", frames.join(", "), outcome.shot_frames)),
@@ -119,7 +115,8 @@ fn facts(outcome: &Outcome, given: &[Given]) -> Vec<(String, String)> {
         fact("Machine's load", format!("{} before, {} after", load[0], load[1])),
         fact("Tracer", outcome.tracer.clone()),
         fact("Whole sweep", whole(outcome)),
-    ]
+    ];
+    facts.into_iter().chain(denoiser).collect()
 }
 
 fn reference(outcome: &Outcome) -> String {
@@ -156,7 +153,8 @@ fn warnings(outcome: &Outcome) -> Vec<String> {
         ));
     }
     let rows = &outcome.measured.rows;
-    let best = rows.iter().map(|row| row.errors.rmse_steps).fold(f64::INFINITY, f64::min);
+    let own = rows.iter().filter(|row| !row.is_denoised);
+    let best = own.map(|row| row.errors.rmse_steps).fold(f64::INFINITY, f64::min);
     let change = outcome.truth.change;
     let longer = "Errors of about this size are overestimated here. A higher --reference-spp lets the reference converge.";
     if !change.is_finite() {
@@ -235,6 +233,10 @@ fn details(outcome: &Outcome, scene: &str, given: &[Given]) -> Vec<Detail> {
         if let Some(mean) = row.camera_samples {
             figures.push(("Camera samples a pixel", short(mean)));
         }
+        if row.is_denoised {
+            figures
+                .push(("Denoised", "from colour, albedo and normals of the frames below".into()));
+        }
         figures.extend([
             ("RMSE", format!("{}/255", short(e.rmse_steps))),
             ("PSNR", format!("{} dB", short(e.psnr))),
@@ -246,10 +248,14 @@ fn details(outcome: &Outcome, scene: &str, given: &[Given]) -> Vec<Detail> {
         ]);
         let figures = figures.into_iter().map(|(name, value)| (name.to_string(), value)).collect();
         let words = ["tweenray", "render", scene].map(String::from);
-        let command: Vec<String> =
+        let mut command: Vec<String> =
             words.into_iter().chain(with_given(given, &row.options)).collect();
+        if row.is_denoised {
+            let channels = ["--aovs", "albedo,normal", "-o", "noisy_####.exr"];
+            command.extend(channels.map(String::from));
+        }
         let command = shell_line(&command);
-        Detail { id, name: name_of(&row.options), figures, command }
+        Detail { id, name: row.name(), figures, command }
     };
     outcome.measured.rows.iter().enumerate().map(detail).collect()
 }
@@ -275,6 +281,10 @@ pub fn knobs(outcome: &Outcome) -> Vec<KnobText> {
                    few pixels of this scene.";
         all.push(KnobText { name: "Oracle".into(), sentences: vec![why.into()] });
     }
+    if outcome.lacks_denoiser {
+        let why = "Left out: oidnDenoise of Intel Open Image Denoise was not found. --denoiser gives its path.";
+        all.push(KnobText { name: Knob::Denoiser.name().into(), sentences: vec![why.into()] });
+    }
     if let Some(writing) = &outcome.writing {
         let sentences =
             about_writing(writing, outcome.measured.default_row().seconds.median.interval);
@@ -289,7 +299,7 @@ fn pictures(outcome: &Outcome) -> Result<Vec<Named>> {
     let named = |candidate: usize| {
         let found = outcome.pictures.iter().find(|p| p.candidate == candidate);
         found.map(|p| Named {
-            name: name_of(&rows[candidate].options),
+            name: rows[candidate].name(),
             id: Some(candidate),
             picture: p.picture.clone(),
         })

@@ -54,7 +54,7 @@ fn frames_of(video: &Path, folder: &Path) -> Vec<Image> {
     // Its fast conversion back is itself two steps off.
     let exact = "scale=in_color_matrix=bt709:flags=accurate_rnd+full_chroma_int+full_chroma_inp";
     let run = ffmpeg.args(["-vf", exact]).arg(names).output().expect("ran");
-    assert!(run.status.success(), "{}", tail(&run.stderr));
+    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
     (1..).map_while(|i| read_image(folder.join(format!("back_{i}.png"))).ok()).collect()
 }
 

@@ -1,6 +1,5 @@
 //! Error against time.
 
-use super::name_of;
 use crate::accuracy::{CandidateRow, Errors, Group, Knob};
 use crate::cli::accuracy::Outcome;
 use crate::page::words::{seconds, short};
@@ -47,6 +46,7 @@ fn colour_of(knob: Knob) -> (&'static str, &'static str) {
         Some(Group::Samples) => ("c2", "samples"),
         Some(Group::Specular) => ("c3", "bounces, cut-off"),
         Some(Group::Tree) => ("c6", "Embree's tree"),
+        Some(Group::Denoiser) => ("c7", "denoised"),
         Some(Group::Intersection | Group::Oracle | Group::Writing) => {
             ("c4", "rules of intersection")
         }
@@ -61,7 +61,7 @@ pub fn scatter(outcome: &Outcome, metric: &Metric) -> Option<Scatter> {
         let y = (metric.of)(&row.errors)?;
         Some(Point {
             id,
-            name: name_of(&row.options),
+            name: row.name(),
             text: format!(
                 "{}, {} {}{}",
                 seconds(interval.estimate),

@@ -1,6 +1,6 @@
 //! All figures.
 
-use super::{median_of, name_of, with_changes, with_ends};
+use super::{median_of, with_changes, with_ends};
 use crate::accuracy::{Goal, fastest_reaching, perhaps_faster};
 use crate::cli::accuracy::Outcome;
 use crate::measure::Median;
@@ -36,9 +36,9 @@ pub fn goals(outcome: &Outcome) -> Table {
                 };
                 let perhaps = perhaps_faster(&outcome.measured, goal, row)
                     .map_or(String::new(), |row| {
-                        format!("; perhaps {}, which takes more --turns to tell", row.options)
+                        format!("; perhaps {}, which takes more --turns to tell", row.name())
                     });
-                let name = name_of(&row.options) + &perhaps;
+                let name = row.name() + &perhaps;
                 [wanted, name, short(median_of(row)), reached]
             }
         };
@@ -69,7 +69,7 @@ pub fn figures(outcome: &Outcome) -> Table {
     for row in &outcome.measured.rows {
         let e = &row.errors;
         table.rows.push(vec![
-            name_of(&row.options),
+            row.name(),
             short(median_of(row)),
             short(e.rmse_steps),
             short(e.psnr),
@@ -105,7 +105,7 @@ pub fn times(outcome: &Outcome) -> Table {
         let [wall, beyond] = against(row.time_ratio.as_ref());
         let [cpu, cpu_beyond] = against(row.cpu_ratio.as_ref());
         table.rows.push(vec![
-            name_of(&row.options),
+            row.name(),
             with_ends(&row.seconds.median, short),
             wall,
             beyond,
@@ -137,7 +137,7 @@ pub fn rays(outcome: &Outcome) -> Table {
         "Rays of a turn by kind: of the frames looked at and those that they are inferred from";
     let mut table = Table::new(caption, &head);
     for row in &outcome.measured.rows {
-        table.rows.push(std::iter::once(name_of(&row.options)).chain(of(&row.rays)).collect());
+        table.rows.push(std::iter::once(row.name()).chain(of(&row.rays)).collect());
     }
     table
 }
