@@ -13,7 +13,7 @@ use sweep::Sweep;
 
 /// The scenes.
 const SCENES: [&str; 5] =
-    ["cornell", "demo", "reflective_spheres", "spheres_on_terrain", "street_at_night"];
+    ["cornell", "reflective_spheres", "demo", "spheres_on_terrain", "courtyard"];
 
 fn main() {
     let named: Vec<String> = std::env::args().skip(1).collect();

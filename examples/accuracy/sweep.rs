@@ -7,7 +7,7 @@ use std::process::Command;
 /// The folder of the repository.
 pub const ROOT: &str = env!("CARGO_MANIFEST_DIR");
 /// What the sweeps are called with.
-pub const OPTIONS: &str = "--size 192x108 --turns 5 --frames 1,8 --reference-spp 256";
+pub const OPTIONS: &str = "--size 640x360 --turns 5 --frames 1,8 --reference-spp 256";
 
 /// What came out for a scene.
 pub struct Sweep {
