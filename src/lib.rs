@@ -13,7 +13,8 @@
 //! 2. `2_trace_and_compare`: rays through [`intersect::EmbreeIntersector`], held against the f64
 //!    [`intersect::Oracle`];
 //! 3. `3_sequence_with_reuse`: a [`scene::Shot`] by [`sequence::SurfaceReuse`], and what its audit
-//!    ([`reuse::audit`]) says of it.
+//!    ([`reuse::audit`]) says of it;
+//! 4. `4_data_set`: depth, normals and mesh numbers for the poses of a NeRF or COLMAP data set.
 //!
 //! Scene files and meshes are read by [`import::load`]; pictures are compared by [`measure::compare`].
 //!

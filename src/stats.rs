@@ -15,7 +15,7 @@ pub enum RayKind {
     Camera,
     /// Rays reflected by mirrors.
     Mirror,
-    /// Rays reflected by rough mirrors.
+    /// Rays reflected by rough surfaces.
     Glossy,
     /// Rays reflected or refracted by glass.
     Glass,

@@ -1,7 +1,7 @@
 //! Adaptive camera samples where they are hard: four pilot samples of a pixel hit fine textures, thin bars, discs of
 //! confusion and small highlights only by chance. With as many rays, uniform samples are never nearer to the truth.
 //!
-//! There are no alpha masks in the program, so thin geometry stands for their edges.
+//! No case here has an alpha mask: thin geometry stands for their edges.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "shows what it measured")]
 

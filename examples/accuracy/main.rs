@@ -1,4 +1,4 @@
-//! `./x accuracy`: what accuracy costs on the scenes of `scenes/`. Sweeps them with the program, and writes the
+//! `./x accuracy`: what accuracy costs on five scenes of `scenes/`. Sweeps them with the program, and writes the
 //! measured part of `docs/accuracy.md` and its pictures from what came out. Up to an hour a scene; a run
 //! that was stopped goes on. The pages of the sweeps lie in `out/accuracy`.
 

@@ -85,8 +85,9 @@ pub struct SettingArgs {
     #[arg(long, value_name = "BITS", value_parser = png_bits)]
     pub png_bits: Option<u8>,
     /// What exr frames hold beside colour, with commas between: depth, position, normal, albedo, mesh-id and
-    /// motion of first hits, the maps provenance, frame, distance and audit, the reference (traced points for
-    /// --references), all, none [default: none; with --references: reference]. --maps adds the maps
+    /// motion of first hits, samples (numbers of camera samples, with --spp MIN..MAX), the maps provenance, frame,
+    /// distance and audit, the reference (traced points for --references), all, none [default: none; with
+    /// --references: reference]. --maps adds the maps, and samples with --spp MIN..MAX
     #[arg(long, value_name = "LIST", value_delimiter = ',', hide_possible_values = true,
         value_parser = values::choice::<Aovs>(&Aovs::NAMES))]
     pub aovs: Vec<Aovs>,
@@ -109,7 +110,8 @@ pub struct SettingArgs {
     #[arg(long, value_name = "N", help_heading = "Light",
         allow_negative_numbers = true, value_parser = whole(0, limits::MAX_SAMPLES))]
     pub fog_samples: Option<u32>,
-    /// What light does that meets glass on its way to a diffuse surface or to fog: it is blocked, or goes straight through [default: opaque]
+    /// What light does that meets glass on its way to a surface or to fog: it is blocked, or goes straight through
+    /// [default: opaque]
     #[arg(long, value_name = "KIND", help_heading = "Light", value_parser = values::choice::<GlassShadows>(&["opaque", "straight"]))]
     pub glass_shadows: Option<GlassShadows>,
     /// Whether every point looks at every light in scenes of more than 8, not only at those that matter there

@@ -1,4 +1,4 @@
-//! Ranks over MPI: the only unsafe code of `cluster`, and the only user of rsmpi.
+//! Ranks over MPI: with `mpi/relay.rs` the only unsafe code of `cluster`, and the only user of rsmpi.
 //!
 //! MPI is initialised as `Funneled`: every call comes from the main thread. The exception is
 //! `MPI_Abort` from the panic hook of any thread, because a rank that unwinds would hang the job in

@@ -1,6 +1,6 @@
 //! The scheduler on rank 0: which rank makes which frame, and which ranks hold which reference.
 //!
-//! A task is one *representative*: the frame that stands for all frames with its camera. A rank asks
+//! A task is one *representative*, the frame that stands for all frames with its camera, or a strip of it. A rank asks
 //! for work by reporting a finished task, and gets tasks one by one. So no assignment is ever revoked:
 //! an unassigned task moves between ranks inside this table only. The scheduler is plain bookkeeping,
 //! without messages and clocks. Its decisions depend on the speed of the ranks; the bytes of a frame do

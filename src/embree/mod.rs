@@ -1,6 +1,6 @@
 //! Embree behind a safe face: `Device` → [`SceneBuilder`] → `commit()` → [`CommittedScene`].
 //!
-//! The only room with `unsafe` (with `ffi/`). Takes f32 triangles and f64 spheres, gives packet
+//! With `ffi/` and the edge to MPI in `cluster` the only code that is `unsafe`. Takes f32 triangles and f64 spheres, gives packet
 //! queries; knows nothing of materials, rules or retries. Only a committed scene can be traced,
 //! and it borrows the buffers that Embree shares.
 

@@ -2,7 +2,7 @@
 //!
 //! An analytic sphere becomes a sphere light; the faces of a mesh become quad lights, at most [`MAX_LIGHTS`]. [`World::into_scene`]
 //! gives lights their surface, so the sphere or mesh itself leaves the world. A mesh that reflects too, emits by an image,
-//! or has cut-outs stays, and the scene makes lights of its faces. A sphere by an image or with cut-outs casts no light.
+//! has cut-outs or needs more lights stays, and the scene makes lights of its faces. A sphere by an image or with cut-outs casts no light.
 
 use super::framing::Middle;
 use super::lamps::cover;

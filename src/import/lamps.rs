@@ -4,8 +4,8 @@ use super::polygon;
 use crate::math::{Bounds3, DVec3, Rgb};
 use crate::scene::{Light, QuadLight, WorldMesh};
 
-/// Most lights made of a mesh: each has bounds in the cells of lights, and a surface of its own. A mesh that needs more is
-/// visible but lights nothing.
+/// Most lights made of a mesh: each has bounds in the cells of lights, and a surface of its own. A mesh that needs more
+/// stays as it is, and the scene makes lights of groups of its faces.
 pub(super) const MAX_LIGHTS: usize = 4096;
 /// Narrower faces, in widths of their mesh, are left out: together they send next to nothing, and f32 may not hold them beside
 /// the rest of the scene.

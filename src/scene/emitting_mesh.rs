@@ -1,5 +1,5 @@
-//! Makes lights of the faces of meshes that emit and are seen as they are: what reflects light too, emits by an image, or has
-//! cut-outs.
+//! Makes lights of the faces of meshes that emit and are seen as they are: what reflects light too, emits by an image, has
+//! cut-outs, or has more faces than import replaces by lights.
 //!
 //! A face is one light, of the mean of what it emits, holes included. Where an image or holes make that differ within a face, the face is cut into rows
 //! of smaller triangles, those first whose parts differ most. So light is right from far away, and near by up to what differs

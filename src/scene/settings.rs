@@ -48,7 +48,7 @@ pub struct Settings {
     /// Look at every light at every point, however little it can send there, in scenes of many lights too.
     #[serde(default)]
     pub all_lights: bool,
-    /// What light does that meets glass on its way to a diffuse surface.
+    /// What light does that meets glass on its way to a surface or to fog.
     #[serde(default)]
     pub glass_shadows: GlassShadows,
     /// Start shadow rays of smooth meshes on the smooth surface, not on its facets.
@@ -182,7 +182,7 @@ impl Default for Settings {
     }
 }
 
-/// What light does that meets glass on its way to a diffuse surface.
+/// What light does that meets glass on its way to a surface or to fog.
 #[derive(
     Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
 )]

@@ -6,8 +6,6 @@
 //! [`ColourMaker`] infer. All three have a [`FrameContext`]; the two that infer keep their references in a pool.
 //! [`checkpoint`] writes references to disk; [`survey`] reports the state of each frame of a sequence. A row
 //! is written after the rename of its frame, so rows always name whole frames, whenever the job ends.
-//!
-//! Not done: every frame is traced alone.
 
 pub mod checkpoint;
 mod colour;

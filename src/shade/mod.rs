@@ -1,7 +1,7 @@
 //! Whitted radiance (Whitted, 1980) along camera rays, by kernels that [`EffectPlan`] selects.
 //!
-//! Takes a scene, an intersector and a camera; gives a film. Direct light from area, point and
-//! directional lights and the sky, mirrors and glass, polished or rough, clear or absorbing, by recursion to a set depth.
+//! Takes a scene, an intersector and a camera; gives a film. Direct light from lights,
+//! emitting faces and the sky or an environment, light scattered once by fog, mirrors and glass, polished or rough, clear or absorbing, by recursion to a set depth.
 //! Never looks at other frames.
 //!
 //! Not done: caustics (the shadow of glass is opaque, or light goes straight through), diffuse interreflection.

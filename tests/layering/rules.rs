@@ -76,7 +76,7 @@ fn check_unsafe(source: &Source, found: &mut Vec<String>) {
     }
     for token in source.tokens.iter().filter(|t| t.text == "unsafe") {
         found.push(format!(
-            "{path}:{}: unsafe belongs in ffi/, src/embree/ and src/cluster/mpi*.rs only",
+            "{path}:{}: unsafe belongs in ffi/, src/embree/, src/cluster/mpi.rs and src/cluster/mpi/ only",
             token.line
         ));
     }

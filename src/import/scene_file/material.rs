@@ -15,7 +15,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 /// A material. `diffuse` and `mirror` add up, to at most 1 in each channel; `glass` excludes all other
-/// keys, `principled` those that say how light is reflected.
+/// keys, but for `alpha` on a thin pane, `principled` those that say how light is reflected.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a table")]
 pub(super) struct Material {

@@ -44,8 +44,8 @@ pub(super) struct Settings {
     fog_samples: Int<0, { limits::MAX_SAMPLES as i64 }>,
     /// In scenes of more than 8 lights, look at every light at every point, not only at those that matter there.
     all_lights: bool,
-    /// What light does that meets glass on its way to a diffuse surface or to fog: "opaque" glass blocks it, "straight" lets it
-    /// go straight on, less what the glass reflects, tints and absorbs.
+    /// What light does that meets glass on its way to a surface or to fog: "opaque" glass blocks it, "straight" lets it go
+    /// straight on, less what the glass reflects, tints and absorbs.
     glass_shadows: GlassShadows,
     /// Start shadow rays of smooth meshes on the smooth surface that their facets stand for, so that
     /// shadows end where the shading does.
