@@ -23,7 +23,6 @@ pub struct Sweep {
 pub struct Row {
     pub knob: String,
     pub options: String,
-    pub is_denoised: bool,
     pub seconds: Measured,
     pub cpu_seconds: Measured,
     /// CPU seconds over the default's.
@@ -94,14 +93,14 @@ impl Sweep {
 
     /// The setting of these options, if it was compared.
     pub fn row(&self, options: &str) -> Option<&Row> {
-        self.rows.iter().find(|row| row.options == options && !row.is_denoised)
+        self.rows.iter().find(|row| row.options == options && !row.is_denoised())
     }
 
     /// The setting of this number of camera samples, or the default without one, whose frames are denoised.
     pub fn denoised(&self, spp: Option<u64>) -> Option<&Row> {
         let spp = spp.map(|spp| spp.to_string());
         let spp_of = |row: &Row| row.options.split_whitespace().nth(1).map(str::to_owned);
-        self.rows.iter().find(|row| row.is_denoised && spp_of(row) == spp)
+        self.rows.iter().find(|row| row.is_denoised() && spp_of(row) == spp)
     }
 
     /// The rows that nothing beats, the fastest first.
@@ -125,7 +124,6 @@ impl Row {
         Self {
             knob: text("knob"),
             options: text("options"),
-            is_denoised: value["is_denoised"].as_bool().unwrap(),
             seconds: Measured::read(&value["seconds"]).unwrap(),
             cpu_seconds: Measured::read(&value["cpu_seconds"]).unwrap(),
             cpu_ratio: Measured::read(&value["cpu_ratio"]),
@@ -136,6 +134,10 @@ impl Row {
             memory: value["memory_bytes"].as_f64().unwrap(),
             on_front: value["on_cpu_front"].as_bool().unwrap(),
         }
+    }
+
+    fn is_denoised(&self) -> bool {
+        self.knob == "denoiser"
     }
 
     pub fn name(&self) -> &str {

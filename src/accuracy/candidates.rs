@@ -55,10 +55,10 @@ impl List<'_> {
     fn add(&mut self, knob: Knob, options: String, turn: impl FnOnce(&mut Settings)) {
         let mut settings = self.base.clone();
         turn(&mut settings);
-        let is_denoised = knob == Knob::Denoiser;
-        let mut same = self.all.iter().filter(|other| other.is_denoised == is_denoised);
+        let is_denoised = knob.is_denoised();
+        let mut same = self.all.iter().filter(|other| other.knob.is_denoised() == is_denoised);
         if same.all(|other| other.settings != settings) {
-            self.all.push(Candidate { knob, options, settings, is_denoised });
+            self.all.push(Candidate { knob, options, settings });
         }
     }
 
@@ -206,17 +206,8 @@ impl List<'_> {
         for (spp, most_spp) in [(less, None), (spp, None), (more, None), range] {
             // Without soft light there is but one number of shadow samples: none.
             for k in if lit == 1 { 0..3 } else { 1..2 } {
-                let mut settings = Settings { spp, most_spp, ..base.clone() };
-                let mut options = format!("--spp {}", settings.camera_samples());
-                // Samples of what is not there would only make twins.
-                if plan.area_lights {
-                    options += &format!(" --shadow-samples {}", shadow[k]);
-                    (settings.shadow_samples, settings.least_shadow_samples) = (shadow[k], None);
-                }
-                if plan.sky_light {
-                    options += &format!(" --sky-samples {}", sky[k]);
-                    (settings.sky_samples, settings.least_sky_samples) = (sky[k], None);
-                }
+                let camera = Settings { spp, most_spp, ..base.clone() };
+                let (settings, options) = with_lights(camera, plan, [shadow[k], sky[k]]);
                 // So would policies where there is nothing to take over.
                 if !self.reuses(&settings) {
                     self.add(Knob::Combination, options, |s| *s = settings);
@@ -246,16 +237,8 @@ impl List<'_> {
         self.add(Knob::Denoiser, String::new(), |_| ());
         let [less, more] = around(self.base.spp);
         for spp in [less, self.base.spp, more] {
-            let mut settings = Settings { spp, most_spp: None, ..self.base.clone() };
-            let mut options = format!("--spp {spp}");
-            if plan.area_lights {
-                options += " --shadow-samples 1";
-                (settings.shadow_samples, settings.least_shadow_samples) = (1, None);
-            }
-            if plan.sky_light {
-                options += " --sky-samples 1";
-                (settings.sky_samples, settings.least_sky_samples) = (1, None);
-            }
+            let camera = Settings { spp, most_spp: None, ..self.base.clone() };
+            let (mut settings, mut options) = with_lights(camera, plan, [1, 1]);
             if self.reuses(&settings) {
                 options += " --policy off";
                 settings.reuse.policy = Policy::Off;
@@ -263,6 +246,25 @@ impl List<'_> {
             self.add(Knob::Denoiser, options, |s| *s = settings);
         }
     }
+}
+
+/// `settings` with these numbers of shadow and sky samples, as far as there is light for them, and the options of its
+/// samples: those of what is not there would only make twins.
+fn with_lights(
+    mut settings: Settings,
+    plan: &EffectPlan,
+    [shadow, sky]: [u32; 2],
+) -> (Settings, String) {
+    let mut options = format!("--spp {}", settings.camera_samples());
+    if plan.area_lights {
+        options += &format!(" --shadow-samples {shadow}");
+        (settings.shadow_samples, settings.least_shadow_samples) = (shadow, None);
+    }
+    if plan.sky_light {
+        options += &format!(" --sky-samples {sky}");
+        (settings.sky_samples, settings.least_sky_samples) = (sky, None);
+    }
+    (settings, options)
 }
 
 /// `x` times `factor` in decimal digits: ten times 0.001 is 0.01, not 0.010000001.
@@ -291,8 +293,9 @@ mod tests {
         let all = candidates(&base, &EffectPlan::EVERYTHING, 100, &yes, &Group::ALL);
         assert_eq!((all[0].knob, &all[0].settings), (Knob::Default, &base));
         for (i, a) in all.iter().enumerate() {
-            let is_new =
-                |b: &Candidate| (&a.settings, a.is_denoised) != (&b.settings, b.is_denoised);
+            let is_new = |b: &Candidate| {
+                (&a.settings, a.knob.is_denoised()) != (&b.settings, b.knob.is_denoised())
+            };
             assert!(all[..i].iter().all(is_new), "{}", a.name());
         }
         let one = Settings { shadow_samples: 1, ..Settings::default() };
@@ -357,7 +360,7 @@ mod tests {
             let looks_up = |_: &Settings| looks_up;
             let everything = &EffectPlan::EVERYTHING;
             let all = candidates(base, everything, 9, &looks_up, &[Group::Denoiser]);
-            assert!(all[1..].iter().all(|c| c.is_denoised && c.knob == Knob::Denoiser));
+            assert!(all[1..].iter().all(|c| c.knob == Knob::Denoiser));
             all.iter().map(Candidate::name).collect()
         };
         let base = Settings { spp: 4, ..Settings::default() };

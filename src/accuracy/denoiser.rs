@@ -3,8 +3,9 @@
 use crate::error::{Error, Result};
 use crate::film::Film;
 use crate::math::{Rgb, Vec3};
-use crate::output::child::watch;
-use std::ffi::OsStr;
+use crate::output::Regular;
+use crate::output::child::{start, watch};
+use std::ffi::OsString;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -24,8 +25,7 @@ impl Denoiser {
     /// [`Error::Io`] where it cannot be read or started, [`Error::Usage`] where it is another program.
     pub fn find(program: &Path) -> Result<Option<Self>> {
         let Some(program) = resolved(program) else { return Ok(None) };
-        let bytes = fs::read(&program).map_err(|e| Error::io("read", &program, e))?;
-        let hash = blake3::hash(&bytes).to_hex()[..12].to_string();
+        let hash = Regular::at(&program)?.hash(&program)?;
         let mut help = Command::new(&program);
         let said = help.arg("--help").stdin(Stdio::null()).output();
         let said = said.map_err(|e| Error::io("run", &program, e))?;
@@ -42,7 +42,7 @@ impl Denoiser {
 
     /// Path of the program, and a hash of its file: what figures of denoised frames depend on.
     pub fn describe(&self) -> String {
-        format!("{} ({})", self.program.display(), self.hash)
+        format!("{} ({:.12})", self.program.display(), self.hash)
     }
 
     /// The radiance of `film`, denoised on the processor with the help of its albedo and normals. These are of one
@@ -61,19 +61,20 @@ impl Denoiser {
         };
         let temporary = tempfile::tempdir()
             .map_err(|e| Error::io("create a folder in", std::env::temp_dir(), e))?;
-        let mut command = Command::new(&self.program);
+        let threads = threads.to_string();
+        let mut args: Vec<OsString> =
+            ["--device", "cpu", "--threads", &threads].map(OsString::from).into();
         for (option, values) in
             [("--hdr", &film.rgb), ("--alb", &gbuffer.albedo), ("--nrm", &gbuffer.normal)]
         {
             let path = temporary.path().join(format!("{}.pfm", &option[2..]));
             fs::write(&path, pfm(film.width, values)).map_err(|e| Error::io("write", &path, e))?;
-            command.args([OsStr::new(option), path.as_os_str()]);
+            args.extend([option.into(), path.into()]);
         }
         let out = temporary.path().join("out.pfm");
-        command.args(["--device", "cpu", "--threads", &threads.to_string(), "-o"]).arg(&out);
-        command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped());
-        let failed = |e| Error::io("run", &self.program, e);
-        let ran = watch(&mut command.spawn().map_err(failed)?, stop).map_err(failed)?;
+        args.extend(["-o".into(), out.clone().into()]);
+        let mut child = start(self.program.as_os_str(), args, Stdio::null())?;
+        let ran = watch(&mut child, stop).map_err(|e| Error::io("run", &self.program, e))?;
         if stop.load(Ordering::Relaxed) {
             return Err(Error::Stopped);
         }
@@ -97,15 +98,11 @@ fn resolved(program: &Path) -> Option<PathBuf> {
     paths.find(|path| path.is_file())?.canonicalize().ok()
 }
 
-/// Size and byte order at the head of a PFM file: three channels, little endian.
-fn head(width: u32, height: usize) -> String {
-    format!("PF\n{width} {height}\n-1.0\n")
-}
-
 /// `rgb`, row by row from the top, as a PFM file, whose rows go from the bottom up (Debevec, 1998).
 fn pfm(width: u32, rgb: &[Vec3]) -> Vec<u8> {
     let rows = rgb.chunks_exact(width as usize);
-    let mut bytes = head(width, rows.len()).into_bytes();
+    // Three channels; a negative scale says that the low byte comes first.
+    let mut bytes = format!("PF\n{width} {}\n-1.0\n", rows.len()).into_bytes();
     let values = rows.rev().flatten().flat_map(|c| c.to_array());
     bytes.extend(values.flat_map(f32::to_le_bytes));
     bytes
@@ -182,9 +179,9 @@ mod tests {
         film.gbuffer = Some(gbuffer.clone());
         let go_on = AtomicBool::new(false);
         let run = |script: &str| program(folder.path(), script).denoise(&film, 1, &go_on);
-        // Options: --hdr COLOUR --alb ALBEDO --nrm NORMAL --device cpu --threads 1 -o OUT.
-        assert_eq!(run("cp $2 ${12}").expect("done"), film.rgb);
-        assert_eq!(run("cp $4 ${12}").expect("done"), gbuffer.albedo);
+        // Options: --device cpu --threads 1 --hdr COLOUR --alb ALBEDO --nrm NORMAL -o OUT.
+        assert_eq!(run("cp $6 ${12}").expect("done"), film.rgb);
+        assert_eq!(run("cp $8 ${12}").expect("done"), gbuffer.albedo);
         let told = |script| run(script).expect_err("failed").to_string();
         assert!(told("echo no memory >&2; exit 3").contains("no memory"));
         assert!(told("exit 0").contains("wrote no picture"));

@@ -134,6 +134,17 @@ impl Knob {
         }
     }
 
+    /// The name of the setting of these options.
+    pub(super) fn name_of(self, options: &str) -> String {
+        let options = if options.is_empty() { "default" } else { options };
+        format!("{options}{}", if self.is_denoised() { ", denoised" } else { "" })
+    }
+
+    /// Whether frames are denoised.
+    pub fn is_denoised(self) -> bool {
+        self == Self::Denoiser
+    }
+
     /// Whether the knob trades error for time, so that its settings may be recommended. Rules of
     /// intersection guard against rare wrong pixels, which no mean error shows; another tree changes next
     /// to no pixel; fewer probes save time and vouch for less; a denoiser is another program.
@@ -153,19 +164,11 @@ pub struct Candidate {
     pub options: String,
     /// The complete settings that it is rendered with: the default's, changed by `options`.
     pub settings: Settings,
-    /// Whether its frames are denoised.
-    pub is_denoised: bool,
 }
 
 impl Candidate {
     /// The setting's name.
     pub fn name(&self) -> String {
-        name_of(&self.options, self.is_denoised)
+        self.knob.name_of(&self.options)
     }
-}
-
-/// The name of the setting of these options.
-pub(super) fn name_of(options: &str, is_denoised: bool) -> String {
-    let options = if options.is_empty() { "default" } else { options };
-    format!("{options}{}", if is_denoised { ", denoised" } else { "" })
 }

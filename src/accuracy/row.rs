@@ -2,7 +2,7 @@
 
 use super::change::Change;
 use super::errors::Errors;
-use super::knobs::{Candidate, Knob, name_of};
+use super::knobs::{Candidate, Knob};
 use super::ledger::TrialRecord;
 use crate::measure::{Median, median};
 use crate::stats::RayCounts;
@@ -16,8 +16,6 @@ pub struct CandidateRow {
     pub knob: Knob,
     /// The options that turn it; empty for the default.
     pub options: String,
-    /// Whether its frames are denoised.
-    pub is_denoised: bool,
     /// The mean of the turns.
     pub errors: Errors,
     /// Root mean squared error of each turn, display steps.
@@ -54,7 +52,7 @@ pub struct CandidateRow {
 impl CandidateRow {
     /// The setting's name.
     pub fn name(&self) -> String {
-        name_of(&self.options, self.is_denoised)
+        self.knob.name_of(&self.options)
     }
 
     /// Whether its pixels were compared with the default's and are the same.
@@ -118,7 +116,6 @@ pub(super) fn row(candidate: &Candidate, own: &Taken, default: Option<&Taken>) -
     CandidateRow {
         knob: candidate.knob,
         options: candidate.options.clone(),
-        is_denoised: candidate.is_denoised,
         errors: Errors::mean(&errors),
         rmse_of_turns: errors.iter().map(|e| e.rmse_steps).collect(),
         seconds: spread(&own.timed(|e| e.seconds)),

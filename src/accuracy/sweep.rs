@@ -77,7 +77,7 @@ impl Sweep<'_> {
             // A range comes near to the error of its upper end.
             samples(&Settings { spp: s.most_camera_samples(), most_spp: None, ..s.clone() })
         };
-        let noisy = self.candidates.iter().filter(|c| !c.is_denoised);
+        let noisy = self.candidates.iter().filter(|c| !c.knob.is_denoised());
         let best = noisy.max_by_key(most);
         let Some(best) = best else { return Ok(0.0) };
         let frame = [self.shown_frame()];
@@ -222,7 +222,7 @@ impl Sweep<'_> {
         let start = Instant::now();
         let seed = seed_of_turn(self.context.base.seed, turn);
         let settings = &Settings { seed, ..candidate.settings.clone() };
-        let denoiser = self.denoiser.filter(|_| candidate.is_denoised);
+        let denoiser = self.denoiser.filter(|_| candidate.knob.is_denoised());
         // Other rules build another tree, one at a time: several would not fit beside a large scene.
         let own = self.context.own_intersector(settings)?;
         let build_seconds = match own {

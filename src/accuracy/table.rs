@@ -45,7 +45,6 @@ pub(super) mod tests {
             knob: *knob,
             options: (*options).into(),
             settings: Settings::default(),
-            is_denoised: false,
         };
         let default = list[0].2;
         let taken = |(.., seconds, rmse): &(Knob, &str, f64, f64)| {

@@ -1,7 +1,9 @@
 //! Waiting for other programs that this one starts.
 
+use crate::error::{Error, Result};
+use std::ffi::OsStr;
 use std::io::{self, Read};
-use std::process::Child;
+use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
@@ -23,6 +25,20 @@ impl Ran {
         let skip = text.chars().count().saturating_sub(1000);
         text.chars().skip(skip).collect()
     }
+}
+
+/// Starts `program`, whose stdout is dropped and whose stderr is for [`watch`].
+///
+/// # Errors
+/// [`Error::Io`].
+pub fn start(
+    program: &OsStr,
+    args: impl IntoIterator<Item = impl AsRef<OsStr>>,
+    stdin: Stdio,
+) -> Result<Child> {
+    let mut command = Command::new(program);
+    command.args(args).stdin(stdin).stdout(Stdio::null()).stderr(Stdio::piped());
+    command.spawn().map_err(|e| Error::io("run", program, e))
 }
 
 /// Waits for `child`, and kills it when `stop` is set. Reads its stderr meanwhile, since a full pipe would block

@@ -10,7 +10,7 @@
 //! [`command`] for exr frames uses ffmpeg's own conversion: the sRGB curve, no exposure.
 
 use super::atomic::Temporary;
-use super::child::{Ran, watch};
+use super::child::{Ran, start, watch};
 use super::{Display, Format, FramePattern, read_image};
 use crate::error::{Error, Result};
 use crate::film::Image;
@@ -18,7 +18,7 @@ use std::ffi::OsStr;
 use std::fs::File;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
-use std::process::{Child, ChildStdin, Command, Stdio};
+use std::process::{ChildStdin, Command, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// The frames of a video.
@@ -164,12 +164,6 @@ fn plain_file(path: &Path) -> String {
         return format!("./{text}");
     }
     text.into_owned()
-}
-
-fn start(program: &OsStr, args: Vec<String>, stdin: Stdio) -> Result<Child> {
-    let mut ffmpeg = Command::new(program);
-    ffmpeg.args(args).stdin(stdin).stdout(Stdio::null()).stderr(Stdio::piped());
-    ffmpeg.spawn().map_err(|e| Error::io("run", program, e))
 }
 
 /// Runs ffmpeg on display values that this process pipes to it.

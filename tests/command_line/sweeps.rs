@@ -51,9 +51,9 @@ fn denoised_frames_stand_beside_those_that_are_not() {
         let status = write.arg(format!("#!/bin/sh\n{help}\n{script}\n")).status();
         assert!(status.expect("a shell").success());
     };
-    // Options: --hdr COLOUR --alb ALBEDO --nrm NORMAL --device cpu --threads 1 -o OUT.
-    program("colour", "cp $2 ${12}");
-    program("albedo", "i=0; while [ $i -lt 100000 ]; do i=$((i+1)); done; cp $4 ${12}");
+    // Options: --device cpu --threads 1 --hdr COLOUR --alb ALBEDO --nrm NORMAL -o OUT.
+    program("colour", "cp $6 ${12}");
+    program("albedo", "i=0; while [ $i -lt 100000 ]; do i=$((i+1)); done; cp $8 ${12}");
     let line =
         "accuracy cube.obj --size 16x12 --frames 1,2 --turns 1 --reference-spp 64 --threads 1";
     let defaults = |denoiser: &str| {
@@ -61,7 +61,8 @@ fn denoised_frames_stand_beside_those_that_are_not() {
         job.done(&format!("{line} {options}"));
         let rows = json(&job, &format!("o_{denoiser}"))["rows"].as_array().expect("rows").clone();
         [false, true].map(|is_denoised| {
-            let is_meant = |row: &&Value| row["options"] == "" && row["is_denoised"] == is_denoised;
+            let is_meant =
+                |row: &&Value| row["options"] == "" && (row["knob"] == "denoiser") == is_denoised;
             rows.iter().find(is_meant).expect("a row").clone()
         })
     };

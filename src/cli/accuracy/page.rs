@@ -153,7 +153,7 @@ fn warnings(outcome: &Outcome) -> Vec<String> {
         ));
     }
     let rows = &outcome.measured.rows;
-    let own = rows.iter().filter(|row| !row.is_denoised);
+    let own = rows.iter().filter(|row| !row.knob.is_denoised());
     let best = own.map(|row| row.errors.rmse_steps).fold(f64::INFINITY, f64::min);
     let change = outcome.truth.change;
     let longer = "Errors of about this size are overestimated here. A higher --reference-spp lets the reference converge.";
@@ -233,7 +233,7 @@ fn details(outcome: &Outcome, scene: &str, given: &[Given]) -> Vec<Detail> {
         if let Some(mean) = row.camera_samples {
             figures.push(("Camera samples a pixel", short(mean)));
         }
-        if row.is_denoised {
+        if row.knob.is_denoised() {
             figures
                 .push(("Denoised", "from colour, albedo and normals of the frames below".into()));
         }
@@ -250,7 +250,7 @@ fn details(outcome: &Outcome, scene: &str, given: &[Given]) -> Vec<Detail> {
         let words = ["tweenray", "render", scene].map(String::from);
         let mut command: Vec<String> =
             words.into_iter().chain(with_given(given, &row.options)).collect();
-        if row.is_denoised {
+        if row.knob.is_denoised() {
             let channels = ["--aovs", "albedo,normal", "-o", "noisy_####.exr"];
             command.extend(channels.map(String::from));
         }
