@@ -14,6 +14,8 @@ use tweenray::scene::{Policy, Rect, Settings};
 use tweenray::shade::{FrameJob, Known, Sampling};
 
 const SCENES: [&str; 4] = ["cornell", "demo", "reflective_spheres", "spheres_on_terrain"];
+/// Those of `scenes/` that take minutes.
+const SLOW: [&str; 5] = ["courtyard", "foggy_hall", "gallery", "materials", "street_at_night"];
 
 fn mean_samples(film: &Film) -> f64 {
     let samples = film.samples.as_ref().expect("adaptive");
@@ -24,7 +26,7 @@ fn uniform(settings: &Settings, spp: u32, seed: u64) -> Settings {
     Settings { spp, most_spp: None, seed, ..settings.clone() }
 }
 
-/// With as many camera rays, uniform samples are off by more in every scene of `scenes/`.
+/// With as many camera rays, uniform samples are off by more.
 #[test]
 fn errors_are_smaller_than_those_of_as_many_uniform_samples() {
     for scene in SCENES {
@@ -49,7 +51,7 @@ fn errors_are_smaller_than_those_of_as_many_uniform_samples() {
 #[ignore = "minutes"]
 fn rays_for_the_error_of_uniform_samples() {
     const UNIFORM: [u32; 5] = [4, 8, 16, 32, 64];
-    for scene in SCENES {
+    for scene in SCENES.into_iter().chain(SLOW) {
         let set = Set::load(scene, |_| ());
         let (stage, shot) = (set.stage(2), set.shot(16));
         let base = Settings { width: 320, height: 180, ..set.settings.clone() };
@@ -68,6 +70,45 @@ fn rays_for_the_error_of_uniform_samples() {
             let rays = 100.0 * mean / equal;
             println!(
                 "  {least}..{most}: {mean:.2} samples, {own:.1} dB, as {equal:.0} uniform: {rays:.0} % of the rays"
+            );
+        }
+    }
+}
+
+/// PSNR of an adaptive reference with the range that `tweenray accuracy` uses and the scene file's light samples, that of
+/// one with half as many as its most samples in every pixel, and the adaptive one's mean samples.
+fn references(scene: &str, size: (u32, u32), most: u32) -> ([f64; 2], f64) {
+    let set = Set::load(scene, |_| ());
+    let (stage, shot) = (set.stage(2), set.shot(16));
+    let base = Settings { width: size.0, height: size.1, ..set.settings.clone() };
+    let traced = |settings: &Settings| stage.traced(settings, &shot, 8, 8);
+    let truth = traced(&uniform(&base, 8 * most, 77));
+    let range = Settings { spp: most / 8, most_spp: Some(most), seed: 5, ..base.clone() };
+    let adaptive = traced(&range);
+    let same = traced(&uniform(&base, most / 2, 5));
+    ([&adaptive, &same].map(|film| psnr_of(&base, film, &truth)), mean_samples(&adaptive))
+}
+
+#[test]
+fn an_adaptive_reference_is_no_less_accurate() {
+    for scene in SCENES {
+        let ([adaptive, uniform], mean) = references(scene, (64, 36), 128);
+        println!("{scene}: {adaptive:.2} dB with {mean:.1} samples, {uniform:.2} dB with 64");
+        assert!(adaptive > uniform && mean < 64.0, "{scene}");
+    }
+}
+
+/// The figures of `docs/accuracy.md` for references.
+#[test]
+#[ignore = "minutes"]
+fn adaptive_references() {
+    for scene in SCENES.into_iter().chain(["courtyard"]) {
+        for most in [128, 256, 512] {
+            let ([adaptive, uniform], mean) = references(scene, (160, 90), most);
+            let ends = [most / 8, most, most / 2];
+            println!(
+                "{scene}: {0}..{1}: {adaptive:.1} dB with {mean:.1} samples; {2}: {uniform:.1} dB",
+                ends[0], ends[1], ends[2]
             );
         }
     }

@@ -69,7 +69,12 @@ fn how(out: &mut String, sweeps: &[Sweep]) {
         let change = reference["change"].as_f64().map_or("–".into(), short);
         let number = |name: &str| reference[name].as_f64().unwrap_or(f64::INFINITY);
         let end = if number("change") > number("wanted") { ", not converged" } else { "" };
-        format!("{}, {change}/255{end}", reference["settings"]["spp"])
+        let settings = &reference["settings"];
+        let least = &settings["spp"];
+        let samples = settings["most_spp"]
+            .as_u64()
+            .map_or(least.to_string(), |most| format!("{least}..{most}"));
+        format!("{samples}, {change}/255{end}")
     });
     out.push('\n');
 }

@@ -1,5 +1,5 @@
-//! The reference that candidates are compared with: traced frames, with twice the samples until they no
-//! longer change.
+//! The reference that candidates are compared with: traced frames, whose most camera samples of a pixel double until
+//! the frames no longer change. The samples are adaptive, as those of candidates.
 
 use super::context::TrialContext;
 use super::errors::{Frames, rms_between};
@@ -22,6 +22,9 @@ pub struct Truth {
 
 /// Camera samples of the first, coarsest reference, at least.
 const FIRST: u32 = 32;
+/// The most camera samples of a pixel over the least, at most. With 8 the references measured are no less accurate than
+/// those with half as many as the most in every pixel (`tests/adaptive.rs`).
+const RANGE: u32 = 8;
 
 /// The settings of the first, coarsest reference: every frame traced, with at least as many bounces and as
 /// low a cut-off as any candidate, and as many shadow samples as the candidate with the most, since the bias
@@ -43,6 +46,12 @@ pub fn truth_settings(base: &Settings, candidates: &[&Settings]) -> Settings {
     settings
 }
 
+/// The least and the most camera samples of a pixel after some doublings of the most, of which there are `first` before any.
+fn samples_of(first: u32, doublings: u32) -> (u32, u32) {
+    let most = first << doublings;
+    (first.max(most / RANGE), most)
+}
+
 /// The seed of a doubling: half of all seeds away from those of candidates, which are the base's and the next
 /// few.
 fn seed_of_doubling(base: u64, doubling: u32) -> u64 {
@@ -59,7 +68,7 @@ pub fn seed_of_turn(base: u64, turn: u32) -> u64 {
 pub struct Doubling {
     /// Number of doublings.
     pub number: u32,
-    /// Camera samples.
+    /// The most camera samples of a pixel.
     pub spp: u32,
     /// Root mean square by which the last doubling changed the frames, in display steps; `None` before any.
     pub change: Option<f64>,
@@ -71,8 +80,8 @@ pub struct Doubling {
 pub enum Step<'a> {
     /// A frame is about to be rendered.
     Frame {
-        /// Camera samples.
-        spp: u32,
+        /// The settings of its doubling.
+        settings: &'a Settings,
         /// Position of the frame among the reference's, from 0.
         k: usize,
         /// Number of frames of the reference.
@@ -82,7 +91,7 @@ pub enum Step<'a> {
     Doubled(&'a Doubling),
 }
 
-/// How a reference is made: its frames are rendered with twice as many camera samples each time, until a
+/// How a reference is made: its frames are rendered with twice the most camera samples of a pixel each time, until a
 /// doubling changes them by less than `wanted`, or the next would take more than `most` samples.
 pub struct Convergence<'a> {
     /// The scene and everything needed to render it.
@@ -123,10 +132,12 @@ impl Convergence<'_> {
         is_near || last.spp.saturating_mul(2) > self.most
     }
 
-    fn settings_of(&self, number: u32) -> Settings {
-        let spp = self.settings.spp << number;
+    /// The settings of a doubling. Only the first has as many camera samples in every pixel.
+    pub fn settings_of(&self, number: u32) -> Settings {
+        let (least, most) = samples_of(self.settings.spp, number);
         let seed = seed_of_doubling(self.context.base.seed, number);
-        Settings { spp, seed, ..self.settings.clone() }
+        let most_spp = (most > least).then_some(most);
+        Settings { spp: least, most_spp, seed, ..self.settings.clone() }
     }
 
     fn double(
@@ -136,10 +147,10 @@ impl Convergence<'_> {
     ) -> Result<Doubling> {
         let number = last.as_ref().map_or(0, |last| last.number + 1);
         let settings = self.settings_of(number);
-        let (spp, of) = (settings.spp, self.frames.len());
+        let (spp, of) = (settings.most_camera_samples(), self.frames.len());
         let mut frames = Frames::new();
         for (k, frame) in self.frames.iter().enumerate() {
-            report(Step::Frame { spp, k, of })?;
+            report(Step::Frame { settings: &settings, k, of })?;
             let (image, _) = self.context.trace(&settings, self.context.intersector, *frame)?;
             frames.insert(*frame, image);
         }
@@ -159,6 +170,13 @@ impl Convergence<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn only_the_most_samples_double_at_first() {
+        let of = |first| [0, 1, 3, 4, 5].map(|doublings| samples_of(first, doublings));
+        assert_eq!(of(32), [(32, 32), (32, 64), (32, 256), (64, 512), (128, 1024)]);
+        assert_eq!(of(64), [(64, 64), (64, 128), (64, 512), (128, 1024), (256, 2048)]);
+    }
 
     #[test]
     fn seeds_of_the_truth_are_no_candidates() {

@@ -63,7 +63,7 @@ pub struct AccuracyArgs {
     #[arg(long, value_name = "N", default_value_t = 6, allow_negative_numbers = true,
         value_parser = whole(1, 1000))]
     turns: u32,
-    /// Most camera samples of the reference, which doubles them until it no longer changes
+    /// Most camera samples of a pixel of the reference, which doubles them until it no longer changes
     #[arg(long, value_name = "N", default_value_t = 1024, allow_negative_numbers = true,
         value_parser = whole(64, MAX_SAMPLES))]
     reference_spp: u32,

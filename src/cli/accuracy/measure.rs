@@ -128,12 +128,14 @@ impl SweepJob<'_> {
         };
         let start = Cell::new(Instant::now());
         let mut hear = |step: Step| match step {
-            Step::Frame { spp, k, of } => {
+            Step::Frame { settings, k, of } => {
                 if k == 0 {
                     start.set(Instant::now());
                 }
                 if k == 0 || self.line.is_drawn() {
-                    let text = format!("reference: {spp} camera samples, frame {} of {of}", k + 1);
+                    let samples = settings.camera_samples();
+                    let text =
+                        format!("reference: {samples} camera samples, frame {} of {of}", k + 1);
                     self.line.tell(&text, 0.0, None);
                 }
                 Ok(())
@@ -142,17 +144,17 @@ impl SweepJob<'_> {
                 ledger.keep_reference(doubling, wanted)?;
                 let seconds = start.get().elapsed().as_secs_f64();
                 let change = doubling.change.map_or(String::new(), |change| {
-                    format!(", {change:.3}/255 from the picture of half as many; goal {wanted:.3}")
+                    format!(", {change:.3}/255 from the one before; goal {wanted:.3}")
                 });
-                // Each doubling takes twice the time of the one before.
+                // Each doubling takes at most twice the time of the one before.
                 let more = self.args.reference_spp / doubling.spp.max(1);
                 let most = (f64::from(more.max(1)).log2().floor().exp2() - 1.0) * 2.0 * seconds;
                 let most = match convergence.is_done(doubling) {
                     true => String::new(),
                     false => format!("; at most {} more", duration(most)),
                 };
-                let spp = doubling.spp;
-                self.line.note(&format!("reference: {spp} camera samples{change}{most}"));
+                let samples = convergence.settings_of(doubling.number).camera_samples();
+                self.line.note(&format!("reference: {samples} camera samples{change}{most}"));
                 Ok(())
             }
         };

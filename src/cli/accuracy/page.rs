@@ -121,10 +121,13 @@ fn facts(outcome: &Outcome, given: &[Given]) -> Vec<(String, String)> {
 
 fn reference(outcome: &Outcome) -> String {
     let truth = outcome.truth;
-    let (spp, shadow) = (truth.settings.spp, truth.settings.shadow_samples);
-    let samples = format!("{spp} camera and {shadow} shadow samples");
+    let (camera, shadow) = (truth.settings.camera_samples(), truth.settings.shadow_samples);
+    let samples = format!("{camera} camera and {shadow} shadow samples");
     match truth.change.is_finite() {
-        true => format!("{samples}, {}/255 away from half as many", short(truth.change)),
+        true => format!(
+            "{samples}, {}/255 away from the one before the last doubling",
+            short(truth.change)
+        ),
         false => format!("{samples}, never doubled"),
     }
 }
