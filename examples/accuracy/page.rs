@@ -2,6 +2,7 @@
 
 use crate::heat::FULL;
 use crate::sweep::{Measured, OPTIONS, ROOT, Row, Sweep};
+use serde_json::Value;
 use std::fmt::Write;
 use tweenray::page::words::{bytes, change, count, percent, seconds, short};
 
@@ -33,7 +34,7 @@ pub fn text(sweeps: &[Sweep]) -> String {
 fn how(out: &mut String, sweeps: &[Sweep]) {
     let json = &sweeps[0].json;
     let loads = sweeps.iter().flat_map(|s| s.json["load"].as_array().unwrap());
-    let loads: Vec<f64> = loads.filter_map(serde_json::Value::as_f64).collect();
+    let loads: Vec<f64> = loads.filter_map(Value::as_f64).collect();
     let (least, most) =
         loads.iter().fold((f64::INFINITY, 0f64), |(l, m), load| (l.min(*load), m.max(*load)));
     let confidence = json["rows"][0]["seconds"]["confidence"].as_f64().unwrap();
@@ -50,7 +51,8 @@ fn how(out: &mut String, sweeps: &[Sweep]) {
     );
     head(out, "", sweeps);
     line(out, "camera, shadow and sky samples", sweeps, |s| {
-        ["spp", "shadow_samples", "sky_samples"].map(|name| s.setting(name).to_string()).join(", ")
+        let [shadow, sky] = ["shadow_samples", "sky_samples"].map(|name| s.setting(name));
+        format!("{}, {shadow}, {sky}", camera_samples(&s.json["default"]))
     });
     line(out, "a frame by default", sweeps, |s| {
         let m = s.default_row().seconds;
@@ -69,14 +71,15 @@ fn how(out: &mut String, sweeps: &[Sweep]) {
         let change = reference["change"].as_f64().map_or("–".into(), short);
         let number = |name: &str| reference[name].as_f64().unwrap_or(f64::INFINITY);
         let end = if number("change") > number("wanted") { ", not converged" } else { "" };
-        let settings = &reference["settings"];
-        let least = &settings["spp"];
-        let samples = settings["most_spp"]
-            .as_u64()
-            .map_or(least.to_string(), |most| format!("{least}..{most}"));
-        format!("{samples}, {change}/255{end}")
+        format!("{}, {change}/255{end}", camera_samples(&reference["settings"]))
     });
     out.push('\n');
+}
+
+/// The camera samples of settings as text: "4", or "4..16".
+fn camera_samples(settings: &Value) -> String {
+    let least = &settings["spp"];
+    settings["most_spp"].as_u64().map_or(least.to_string(), |most| format!("{least}..{most}"))
 }
 
 fn head(out: &mut String, name: &str, sweeps: &[Sweep]) {

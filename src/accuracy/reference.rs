@@ -46,7 +46,8 @@ pub fn truth_settings(base: &Settings, candidates: &[&Settings]) -> Settings {
     settings
 }
 
-/// The least and the most camera samples of a pixel after some doublings of the most, of which there are `first` before any.
+/// The least and the most camera samples of a pixel after some doublings of the most, of which there are `first`
+/// before any.
 fn samples_of(first: u32, doublings: u32) -> (u32, u32) {
     let most = first << doublings;
     (first.max(most / RANGE), most)
