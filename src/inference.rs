@@ -66,17 +66,22 @@ impl SurfacePoint {
 }
 
 /// An estimate of one light at a point from other frames, and its risk.
+///
+/// The lights of a point are ordered by what they send without shadows: those up to one of them may be inferred, while the
+/// brighter ones are traced.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Estimate {
     /// Ratio of shadowed to unshadowed irradiance; NaN where no other frame knows it.
     pub ratio: f32,
-    /// Level of risk, from the samples around the point.
+    /// Level of risk, from the samples around the point, of this light and of all that send less, together.
     pub level: u8,
+    /// How many lights of the point send less.
+    pub order: u32,
 }
 
 impl Estimate {
     /// No estimate.
-    pub const UNKNOWN: Self = Self { ratio: f32::NAN, level: 0 };
+    pub const UNKNOWN: Self = Self { ratio: f32::NAN, level: 0, order: 0 };
 }
 
 /// One check ray is cast for this many shadow rays that tracing would cast.
@@ -90,10 +95,16 @@ const FEWEST_CHECKS: u32 = 4;
 /// more than the fewest, and many lights hide more together than it.)
 const SHARED: f32 = 1.5;
 
+/// Multiple of the check rays where other lights of the point are traced: what throws their shadows may throw one that no
+/// sample of this light shows.
+const BESIDE_RISK: u32 = 2;
+
 /// Number of check rays to a light for an answer that saves `rays` shadow rays to it. The check is of all lights of a
-/// point together: this one sends the part `share` of what arrives without shadows.
-pub fn check_rays(rays: u32, share: f32) -> u32 {
-    let all = (rays / RAYS_PER_CHECK).max(FEWEST_CHECKS).min(rays);
+/// point together that are inferred: this one sends the part `share` of what arrives of these without shadows. The point's
+/// other lights may be traced (`in_part`).
+pub fn check_rays(rays: u32, share: f32, in_part: bool) -> u32 {
+    let all = (rays / RAYS_PER_CHECK).max(FEWEST_CHECKS);
+    let all = all.saturating_mul(if in_part { BESIDE_RISK } else { 1 }).min(rays);
     ((SHARED * share * all as f32).ceil() as u32).clamp(all.min(1), all)
 }
 
@@ -255,6 +266,17 @@ pub enum Channel {
     Sky(u32),
 }
 
+impl Channel {
+    /// Which of the ratios of its light it is: 0 for the first, which lights of one colour have alone.
+    pub fn part(self) -> u32 {
+        match self {
+            Self::Area(_, part) | Self::Selected(_, part) | Self::Tail(part) | Self::Sky(part) => {
+                part
+            }
+        }
+    }
+}
+
 /// The lights whose ratios are kept.
 ///
 /// For an area light the ratio is that of shadowed to unshadowed irradiance at the shading normal;
@@ -371,9 +393,16 @@ mod tests {
 
     #[test]
     fn lights_share_check_rays_and_hide_little_more_than_one_with_the_fewest() {
-        assert_eq!([0, 1, 3, 16, 64, 100].map(|rays| check_rays(rays, 1.0)), [0, 1, 3, 4, 4, 6]);
-        assert_eq!([0.9, 0.1].map(|share| check_rays(16, share)), [4, 1]);
-        assert_eq!([check_rays(160, 0.5), check_rays(160, 0.0), check_rays(0, 0.5)], [8, 1, 0]);
+        assert_eq!(
+            [0, 1, 3, 16, 64, 100].map(|rays| check_rays(rays, 1.0, false)),
+            [0, 1, 3, 4, 4, 6]
+        );
+        assert_eq!([0.9, 0.1].map(|share| check_rays(16, share, false)), [4, 1]);
+        let of = |rays, share| check_rays(rays, share, false);
+        assert_eq!([of(160, 0.5), of(160, 0.0), of(0, 0.5)], [8, 1, 0]);
+        // Twice as many where other lights are traced.
+        assert_eq!([1.0, 0.1].map(|share| check_rays(64, share, true)), [8, 2]);
+        assert_eq!(check_rays(6, 1.0, true), 6);
         let one = hidden(FEWEST_CHECKS);
         for (rays, lights) in [16, 100, 1024].into_iter().flat_map(|r| (2..30).map(move |n| (r, n)))
         {
@@ -382,7 +411,7 @@ mod tests {
                 let all: f64 = (0..lights).map(sent).sum();
                 let of = |k: i32| {
                     let share = sent(k) / all;
-                    share * share * hidden(check_rays(rays, share as f32))
+                    share * share * hidden(check_rays(rays, share as f32, false))
                 };
                 let together: f64 = (0..lights).map(of).sum();
                 // A fifth more at worst, for a few lights of some kinds.

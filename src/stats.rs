@@ -162,6 +162,9 @@ pub struct ReuseCounts {
     pub specular: u64,
     /// Those of them that were inferred.
     pub specular_inferred: u64,
+    /// Points of both kinds some of whose lights were inferred and others traced.
+    #[serde(default)]
+    pub inferred_in_part: u64,
 }
 
 impl ReuseCounts {
@@ -172,12 +175,17 @@ impl ReuseCounts {
 
     /// Whether anything was inferred.
     pub fn is_inferred(&self) -> bool {
-        self.direct_inferred + self.specular_inferred > 0
+        self.direct_inferred + self.specular_inferred + self.inferred_in_part > 0
     }
 
     /// Share of the points that were inferred, 0 to 1; `None` where there was none to infer.
     pub fn share(&self) -> Option<f64> {
         share(self.direct_inferred + self.specular_inferred, self.direct + self.specular)
+    }
+
+    /// Share of the points that were inferred in part, 0 to 1; `None` where there was none to infer.
+    pub fn share_in_part(&self) -> Option<f64> {
+        share(self.inferred_in_part, self.direct + self.specular)
     }
 
     /// Share of the points seen in mirrors, through glass or out of focus that were inferred, 0 to 1; `None` without any.
@@ -196,6 +204,7 @@ impl AddAssign for ReuseCounts {
         self.direct_inferred += o.direct_inferred;
         self.specular += o.specular;
         self.specular_inferred += o.specular_inferred;
+        self.inferred_in_part += o.inferred_in_part;
     }
 }
 

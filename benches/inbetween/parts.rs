@@ -8,7 +8,7 @@ use support::Candidate;
 use tweenray::film::{Provenance, ProvenanceKind};
 use tweenray::inference::{Channels, Inference, LookupBatch};
 use tweenray::output::{WriteOptions, write_image};
-use tweenray::reuse::{self, Lookup, Reference};
+use tweenray::reuse::{self, Lookup, LookupChannel, Reference};
 use tweenray::scene::{Camera, Policy, Settings, Shot};
 use tweenray::sequence::Pyramid;
 use tweenray::shade::{FrameJob, Rendered, Renderer, Reuse};
@@ -55,8 +55,7 @@ struct Stand<'a> {
     settings: &'a Settings,
     camera: Camera,
     channels: Channels,
-    /// Shadow rays of a camera sample in each channel.
-    rays: Vec<u32>,
+    looked_up: Vec<LookupChannel>,
     references: Vec<Reference>,
 }
 
@@ -65,10 +64,10 @@ impl<'a> Stand<'a> {
     fn new(stage: &'a Stage<'a>, settings: &'a Settings, shot: &Shot) -> Self {
         let channels = reuse::channels(&stage.set.scene, settings);
         let camera = |f: u32| shot.camera(f, settings.width, settings.height).expect("a camera");
-        let rays = channels.iter().map(|channel| reuse::rays_of(channel, settings)).collect();
+        let looked_up = LookupChannel::all(&channels, settings);
         let eye = camera(FRAME);
         let mut stand =
-            Self { stage, settings, camera: eye, channels, rays, references: Vec::new() };
+            Self { stage, settings, camera: eye, channels, looked_up, references: Vec::new() };
         let pyramid = Pyramid { segment: FRAMES - 1, frames: FRAMES };
         let mut known: BTreeMap<u32, Reference> = BTreeMap::new();
         let wanted = pyramid.ancestors(FRAME);
@@ -87,7 +86,7 @@ impl<'a> Stand<'a> {
     }
 
     fn lookup<'l>(&'l self, frame: u32, references: &'l [&'l Reference]) -> Lookup<'l> {
-        Lookup { frame, references, rays: &self.rays }
+        Lookup { frame, references, channels: &self.looked_up }
     }
 
     fn job<'j>(

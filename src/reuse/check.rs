@@ -10,9 +10,14 @@ use crate::inference::LookupBatch;
 /// deviations that this mean would have if the estimate were right.
 const MOST_DEVIATIONS: f32 = 2.0;
 
-/// Whether the check rays of point `at` agree with its estimates, all lights together. A difference of up to
-/// `tolerance` display steps always agrees.
-pub fn agrees(batch: &LookupBatch, at: usize, channels: usize, tolerance: f32) -> bool {
+/// Whether the check rays of point `at` agree with its estimates, all lights up to order `most` together. A difference of up
+/// to `tolerance` display steps always agrees.
+pub fn agrees(
+    batch: &LookupBatch,
+    (at, channels): (usize, usize),
+    most: u32,
+    tolerance: f32,
+) -> bool {
     let LookupBatch { unshadowed, estimates, checked, .. } = batch;
     let own = at * channels..(at + 1) * channels;
     let Some(checked) = checked.get(own.clone()) else { return false };
@@ -21,7 +26,7 @@ pub fn agrees(batch: &LookupBatch, at: usize, channels: usize, tolerance: f32) -
     let (mut estimated, mut further, mut variance, mut rays) = (0.0, 0.0, 0.0, 0);
     for ((unshadowed, estimate), checked) in lights {
         estimated += unshadowed * estimate.ratio;
-        if checked.rays > 0 {
+        if checked.rays > 0 && estimate.order <= most {
             rays += checked.rays;
             further += unshadowed * (checked.ratio - estimate.ratio);
             // A tail's ratio may be above 1, where no ray is blocked.
@@ -48,11 +53,11 @@ mod tests {
         let batch = LookupBatch {
             points: vec![point],
             unshadowed: vec![0.5],
-            estimates: vec![Estimate { ratio, level: 0 }],
+            estimates: vec![Estimate { ratio, level: 0, order: 0 }],
             checked: vec![checked],
             ..LookupBatch::default()
         };
-        agrees(&batch, 0, 1, 0.25)
+        agrees(&batch, (0, 1), 0, 0.25)
     }
 
     #[test]

@@ -2,7 +2,7 @@
 //! every machine decides alike.
 
 use super::evidence::{Evidence, Finding};
-use super::risk::is_direct;
+use super::risk::{is_direct, is_part};
 use crate::effects::EffectPlan;
 use crate::error::counted;
 use crate::inference::{Channel, Channels, SAMPLES_TOGETHER, check_rays};
@@ -37,9 +37,15 @@ fn is_worth(scene: &Scene, rays: u32) -> bool {
     f64::from(rays) * shadow_ray(scene) > LOOKUP
 }
 
+/// Whether to infer a light whose point is traced to others, which saves `rays` shadow rays: where its check rays cost at
+/// most half as much.
+pub(super) fn is_worth_in_part(rays: u32) -> bool {
+    2.0 * CHECK_RAY * f64::from(check_rays(rays, 1.0, true)) <= f64::from(rays)
+}
+
 /// Number of shadow rays that one camera sample casts to the light of a channel; the largest number where points
 /// may stop after pilot rays.
-pub fn rays_of(channel: Channel, settings: &Settings) -> u32 {
+pub(super) fn rays_of(channel: Channel, settings: &Settings) -> u32 {
     match channel {
         Channel::Area(..) | Channel::Selected(..) | Channel::Tail(_) => settings.shadow_samples,
         Channel::Sky(_) => settings.sky_samples,
@@ -217,7 +223,7 @@ impl PointCost {
         };
         let checked = |channel| {
             let saved = samples.saturating_mul(rays_of(channel, settings));
-            check_rays(saved, 1.0 / lights.max(1.0) as f32)
+            check_rays(saved, 1.0 / lights.max(1.0) as f32, false)
         };
         Self {
             traced: shadow_ray(scene) * sum(&traced),
@@ -237,6 +243,8 @@ pub fn is_worth_lookups<'f>(
 ) -> bool {
     let of_samples = |samples| PointCost::of(scene, channels, settings, samples);
     let (direct, specular) = (of_samples(direct_samples(settings)), of_samples(1));
+    // Each point has one finding of all its lights.
+    let findings = findings.filter(|finding| !is_part(finding.level));
     let gain = |finding: &Finding| {
         let cost = if is_direct(finding.level) { &direct } else { &specular };
         let saved = match (evidence.may_use(finding.level, 1.0), finding.agreed) {

@@ -8,7 +8,7 @@
 //!
 //! Every figure is a sum over findings in a fixed order.
 
-use super::risk::{LEVELS, STEPS, risk_of, shown};
+use super::risk::{LEVELS, STEPS, of_lights, risk_of, shown};
 use crate::inference::Estimate;
 
 /// Number of adjacent levels, on each side, whose findings count too when a level is judged. Their errors are scaled
@@ -24,8 +24,11 @@ const GUARD: f64 = 1.25;
 /// tile: errors are rare and large, so some tiles are above the mean.
 const UNSEEN_SHARE: f64 = 0.5;
 
-/// The errors of the estimate and of a trace at a surface point of a probe, summed over the lights that other
-/// frames know.
+/// Some of a point's lights have a finding of their own if their risk is so many levels below that of more lights.
+const CALMER: usize = 2;
+
+/// The errors of the estimate and of a trace at a surface point of a probe, summed over some or all of the lights that
+/// other frames know. The findings of a point follow one another, that of all lights first.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Finding {
     /// Level of the estimate's risk: an index into the levels of four scales, one scale after another (detail and all
@@ -48,6 +51,8 @@ pub struct LightComparison {
     pub estimate: Estimate,
     /// Traced ratios.
     pub traced: [f32; 2],
+    /// Whether check rays agreed with the estimates of this light and of those that send less.
+    pub agreed: bool,
 }
 
 impl LightComparison {
@@ -59,11 +64,12 @@ impl LightComparison {
         if light == 0.0 {
             return;
         }
+        self.agreed &= other.agreed;
         let by = light / self.unshadowed;
         let mean =
             |own: f32, other: f32| if own_light == 0.0 { other } else { own + (other - own) * by };
         self.estimate.ratio = mean(self.estimate.ratio, other.estimate.ratio);
-        let risk = |level: u8| (usize::from(level) % STEPS, level);
+        let risk = |level: u8| (usize::from(level) % STEPS, of_lights(level, false));
         if risk(other.estimate.level) > risk(self.estimate.level) {
             self.estimate.level = other.estimate.level;
         }
@@ -73,24 +79,49 @@ impl LightComparison {
     }
 }
 
-/// The finding at a point that makes up `share` of its pixel, from the comparisons of its `lights`; `None` where
-/// other frames know none of them.
-pub fn finding_of(share: f32, lights: &[LightComparison], agreed: bool) -> Option<Finding> {
+/// The findings at a point that makes up `share` of its pixel, from the comparisons of its `lights`: of all that other
+/// frames know, and of fewer, weaker lights; none where other frames know no light.
+pub fn findings_of(share: f32, lights: &[LightComparison]) -> Vec<Finding> {
     let is_known = |l: &&LightComparison| {
         l.unshadowed != 0.0 && !l.estimate.ratio.is_nan() && !l.traced.iter().any(|r| r.is_nan())
     };
-    let lights = || lights.iter().filter(is_known);
-    let level = lights().next()?.estimate.level;
-    let sum =
-        |ratio: &dyn Fn(&LightComparison) -> f32| lights().map(|l| l.unshadowed * ratio(l)).sum();
-    let shown = |radiance: f32| f64::from(shown(radiance));
-    let estimated = shown(sum(&|l| l.estimate.ratio));
-    let [a, b] = [0, 1].map(|k| shown(sum(&|l| l.traced[k])));
-    let share = f64::from(share) * f64::from(share);
-    let error = (share * (estimated - a) * (estimated - b)) as f32;
-    let noise = (share * 0.5 * (a - b) * (a - b)) as f32;
-    // Light beyond what f32 holds tells nothing.
-    (error.is_finite() && noise.is_finite()).then_some(Finding { level, agreed, error, noise })
+    let mut known: Vec<&LightComparison> = lights.iter().filter(is_known).collect();
+    known.sort_by_key(|light| light.estimate.order);
+    let mut findings = Vec::new();
+    let mut last = usize::MAX;
+    for count in (1..=known.len()).rev() {
+        let (own, others) = known.split_at(count);
+        // The ratios of one light are used together.
+        let order = |light: &&&LightComparison| light.estimate.order;
+        if own.last().map(|l| order(&l)) == others.first().map(|l| order(&l)) {
+            continue;
+        }
+        let step = |light: &LightComparison| usize::from(light.estimate.level) % STEPS;
+        let riskiest = own.iter().max_by_key(|l| (step(l), l.estimate.order));
+        let (Some(riskiest), Some(highest)) = (riskiest, own.last()) else { continue };
+        if !findings.is_empty() && step(riskiest) + CALMER > last {
+            continue;
+        }
+        last = step(riskiest);
+        let sum = |lights: &[&LightComparison], ratio: &dyn Fn(&LightComparison) -> f32| -> f32 {
+            lights.iter().map(|l| l.unshadowed * ratio(l)).sum()
+        };
+        // The other lights as they are.
+        let rest = sum(others, &|l| 0.5 * (l.traced[0] + l.traced[1]));
+        let shown = |radiance: f32| f64::from(shown(rest + radiance));
+        let estimated = shown(sum(own, &|l| l.estimate.ratio));
+        let [a, b] = [0, 1].map(|k| shown(sum(own, &|l| l.traced[k])));
+        let square = f64::from(share) * f64::from(share);
+        let error = (square * (estimated - a) * (estimated - b)) as f32;
+        let noise = (square * 0.5 * (a - b) * (a - b)) as f32;
+        let level = of_lights(riskiest.estimate.level, !others.is_empty());
+        let agreed = highest.agreed;
+        // Light beyond what f32 holds tells nothing.
+        if error.is_finite() && noise.is_finite() {
+            findings.push(Finding { level, agreed, error, noise });
+        }
+    }
+    findings
 }
 
 /// The levels of risk whose estimates may be used.
@@ -193,16 +224,16 @@ mod tests {
 
     #[test]
     fn camera_samples_estimated_separately_are_one_finding() {
-        let light = |ratio, traced: [f32; 2], level| {
-            let estimate = Estimate { ratio, level };
-            LightComparison { unshadowed: 0.5, estimate, traced }
-        };
+        let light = |ratio, traced, level| light(ratio, traced, level, 0);
         // The estimates are off by the same, the traces by chance.
         let mut one = light(0.5, [0.75, 0.85], 3);
         one.join(&light(0.5, [0.85, 0.75], 5), 0.5);
-        assert_eq!((one.unshadowed, one.estimate), (0.5, Estimate { ratio: 0.5, level: 5 }));
+        assert_eq!(
+            (one.unshadowed, one.estimate),
+            (0.5, Estimate { ratio: 0.5, level: 5, order: 0 })
+        );
         assert!(one.traced.iter().all(|traced| (traced - 0.8).abs() < 1e-6));
-        let found = finding_of(1.0, &[one], true).expect("a finding");
+        let found = findings_of(1.0, &[one])[0];
         assert!(found.noise < 1e-6 && found.error > 100.0, "{found:?}");
         // More risk counts, on whichever scale.
         one.join(&light(0.5, [0.8; 2], STEPS as u8 + 4), 0.5);
@@ -281,22 +312,44 @@ mod tests {
         assert!(!may_use(&probes, EDGE));
     }
 
+    fn light(ratio: f32, traced: [f32; 2], level: u8, order: u32) -> LightComparison {
+        let estimate = Estimate { ratio, level, order };
+        LightComparison { unshadowed: 0.5, estimate, traced, agreed: true }
+    }
+
     #[test]
     fn a_finding_compares_all_known_lights_together() {
-        let light = |ratio: f32, traced| LightComparison {
-            unshadowed: 0.5,
-            estimate: Estimate { ratio, level: EDGE },
-            traced,
-        };
+        let light = |ratio: f32, traced| light(ratio, traced, EDGE, 0);
+        let all = |share, lights: &[LightComparison]| findings_of(share, lights)[0];
         // One light's error makes up for the other's.
-        let lights = [light(0.5, [0.25; 2]), light(0.5, [0.75; 2])];
-        let finding = finding_of(1.0, &lights, true).expect("known");
+        let finding = all(1.0, &[light(0.5, [0.25; 2]), light(0.5, [0.75; 2])]);
         assert_eq!((finding.error, finding.noise, finding.level), (0.0, 0.0, EDGE));
         let noisy = [light(0.5, [0.25, 0.75]), light(f32::NAN, [1.0, 0.0])];
-        let finding = finding_of(1.0, &noisy, true).expect("one is known");
+        let finding = all(1.0, &noisy);
         assert!(finding.error < 0.0 && finding.noise > 0.0);
-        let half = finding_of(0.5, &noisy, true).expect("one is known");
-        assert!((half.noise / finding.noise - 0.25).abs() < 1e-6);
-        assert!(finding_of(1.0, &noisy[1..], true).is_none());
+        assert!((all(0.5, &noisy).noise / finding.noise - 0.25).abs() < 1e-6);
+        assert!(findings_of(1.0, &noisy[1..]).is_empty());
+    }
+
+    #[test]
+    fn calm_lights_beside_a_brighter_risky_one_have_a_finding_of_their_own() {
+        let lights = [
+            light(0.0, [1.0, 0.5], EDGE, 2),
+            light(0.5, [0.25; 2], CALM, 0),
+            // As calm as the one before it.
+            LightComparison { agreed: false, ..light(0.5, [0.5; 2], CALM + 1, 1) },
+        ];
+        let found = findings_of(1.0, &lights);
+        let part = of_lights(CALM + 1, true);
+        assert_eq!(found.iter().map(|f| f.level).collect::<Vec<_>>(), [EDGE, part]);
+        assert_eq!([found[0].agreed, found[1].agreed], [true, false]);
+        assert!(found[0].noise > 0.0 && found[1].noise == 0.0);
+        // Beside the risky light as it is, not beside its estimate.
+        let shown = |ratio: f32| f64::from(shown(0.5 * (0.75 + 0.5 + ratio)));
+        let expected = (shown(0.5) - shown(0.25)).powi(2);
+        assert!((f64::from(found[1].error) / expected - 1.0).abs() < 1e-4);
+        // Two ratios of one light are one set.
+        let parts = [light(0.0, [1.0, 0.5], EDGE, 0), light(0.5, [0.25; 2], EDGE, 0)];
+        assert_eq!(findings_of(1.0, &parts).len(), 1);
     }
 }

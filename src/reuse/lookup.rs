@@ -7,14 +7,18 @@
 
 mod estimate;
 
+use estimate::Buffers;
 pub(super) use estimate::steps_per_radiance;
 
 use super::check::agrees;
+use super::cost::{is_worth_in_part, rays_of};
 use super::evidence::Evidence;
 use super::reference::{NONE, Reference};
+use super::risk::is_part;
 use super::taps::{ALWAYS, References, TOGETHER, Taps, Taps4, sum};
 use crate::film::{Provenance, ProvenanceKind};
-use crate::inference::{Estimate, Inference, LookupBatch};
+use crate::inference::{Channel, Channels, Estimate, Inference, LookupBatch};
+use crate::scene::Settings;
 
 /// Least sum of weights for an estimate; a reference that surrounds the point gives 1.
 pub(super) const LEAST_WEIGHT: f64 = 0.1;
@@ -25,8 +29,28 @@ pub struct Lookup<'a> {
     pub frame: u32,
     /// The references in the order of lookup: the first two always, the others where these give too little weight.
     pub references: &'a [&'a Reference],
-    /// Shadow rays that tracing casts from a camera sample to each light whose ratios are kept.
-    pub rays: &'a [u32],
+    /// The channels of ratios, those of one light in a row.
+    pub channels: &'a [LookupChannel],
+}
+
+/// A channel of ratios.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct LookupChannel {
+    /// Shadow rays that tracing casts from a camera sample to its light.
+    pub rays: u32,
+    /// Whether it is the first one of its light: the ratios of a light are used together.
+    pub is_first: bool,
+}
+
+impl LookupChannel {
+    /// All `channels`.
+    pub fn all(channels: &Channels, settings: &Settings) -> Vec<Self> {
+        let of = |channel: Channel| Self {
+            rays: rays_of(channel, settings),
+            is_first: channel.part() == 0,
+        };
+        channels.iter().map(of).collect()
+    }
 }
 
 /// Answers with those estimates of a lookup that the evidence allows.
@@ -43,31 +67,36 @@ impl Inference for Judged<'_> {
     fn infer(&self, batch: &mut LookupBatch) {
         self.lookup.estimate(batch);
         let LookupBatch { points, pixels, ratios, estimates, provenance, checks, .. } = batch;
-        let channels = self.lookup.rays.len();
+        let channels = self.lookup.channels.len();
         let answers = ratios.chunks_exact_mut(channels).zip(estimates.chunks_exact(channels));
         for (i, (ratios, estimates)) in answers.enumerate() {
             if provenance[i] == Provenance::default() {
                 continue;
             }
-            // One level for all lights of a point.
-            let known = estimates.iter().find(|estimate| !estimate.ratio.is_nan());
-            let Some(known) = known else { continue };
-            if !(self.evidence)(pixels[i]).may_use(known.level, batch.refinement) {
-                continue;
-            }
-            ratios.iter_mut().zip(estimates).for_each(|(ratio, e)| *ratio = e.ratio);
+            let evidence = (self.evidence)(pixels[i]);
+            let known = || estimates.iter().enumerate().filter(|(_, e)| !e.ratio.is_nan());
+            let is_worth = |(channel, e): &(usize, &Estimate)| {
+                let rays = self.lookup.channels[*channel].rays.saturating_mul(points[i].samples);
+                !is_part(e.level) || is_worth_in_part(rays)
+            };
+            let allowed = known().filter(is_worth);
+            let allowed = allowed.filter(|(_, e)| evidence.may_use(e.level, batch.refinement));
+            // The brighter lights are traced.
+            let Some(most) = allowed.map(|(_, e)| e.order).max() else { continue };
             checks.resize(points.len() * channels, false);
-            let own = &mut checks[i * channels..][..channels];
-            own.iter_mut().zip(estimates).for_each(|(check, e)| *check = !e.ratio.is_nan());
+            let checks = &mut checks[i * channels..][..channels];
+            for (channel, estimate) in known().filter(|(_, e)| e.order <= most) {
+                (ratios[channel], checks[channel]) = (estimate.ratio, true);
+            }
         }
     }
 
     fn check(&self, batch: &mut LookupBatch) {
-        let channels = self.lookup.rays.len();
+        let channels = self.lookup.channels.len();
         for at in 0..batch.points.len() {
             let own = at * channels..(at + 1) * channels;
             let is_checked = batch.checks[own.clone()].contains(&true);
-            if is_checked && !agrees(batch, at, channels, self.tolerance) {
+            if is_checked && !agrees(batch, (at, channels), u32::MAX, self.tolerance) {
                 batch.ratios[own].fill(f32::NAN);
             }
         }
@@ -78,7 +107,7 @@ impl Lookup<'_> {
     /// Fills estimates and provenance for all points.
     pub fn estimate(&self, batch: &mut LookupBatch) {
         let LookupBatch { points, unshadowed, lights, estimates, provenance, .. } = batch;
-        let channels = self.rays.len();
+        let channels = self.channels.len();
         estimates.clear();
         estimates.resize(points.len() * channels, Estimate::UNKNOWN);
         let each = points
@@ -88,7 +117,7 @@ impl Lookup<'_> {
             .zip(provenance.chunks_mut(TOGETHER));
         let references = References(self.references);
         let mut taps = Taps::new();
-        let mut means = Vec::with_capacity(channels);
+        let mut buffers = Buffers::default();
         for (chunk, (((points, unshadowed), estimates), provenance)) in each.enumerate() {
             let lights = |i: usize| {
                 let own = lights.get((chunk * TOGETHER + i) * channels..);
@@ -103,7 +132,7 @@ impl Lookup<'_> {
                 if taps.weight >= LEAST_WEIGHT {
                     let own = &mut estimates[i * channels..][..channels];
                     let shown = (shown(i), lights(i));
-                    self.estimate_all(&taps, point, shown, &mut means, own);
+                    self.estimate_all(&taps, point, shown, &mut buffers, own);
                     provenance[i] = self.provenance(&taps);
                 }
             }

@@ -2,7 +2,7 @@
 
 use super::Lookup;
 use super::check::agrees;
-use super::evidence::{Finding, LightComparison, finding_of};
+use super::evidence::{Finding, LightComparison, findings_of};
 use crate::film::Provenance;
 use crate::inference::{Estimate, Inference, LookupBatch, SurfacePoint, channel_of};
 use crate::sampling::mix;
@@ -130,14 +130,14 @@ impl<'a> Probe<'a> {
                 None => notes.push(own),
             }
         }
-        let finding = |note: &Note| {
+        let findings = |note: &Note| {
             let samples = samples(note.pixel) as f32;
-            let share = note.point.samples as f32 / samples;
-            let found = finding_of(share, &note.lights, note.agreed)?;
-            Some(Finding { noise: found.noise * (samples / spp as f32), ..found })
+            let mut found = findings_of(note.point.samples as f32 / samples, &note.lights);
+            found.iter_mut().for_each(|found| found.noise *= samples / spp as f32);
+            found
         };
         let of_pixel = |(pixel, notes): ([u32; 2], Vec<Note>)| {
-            (pixel, notes.iter().filter_map(finding).collect())
+            (pixel, notes.iter().flat_map(findings).collect())
         };
         all.into_iter().map(of_pixel).collect()
     }
@@ -186,17 +186,25 @@ impl Inference for Probe<'_> {
     fn hear(&self, answered: &LookupBatch) {
         let LookupBatch { points, pixels, unshadowed, lights, ratios, estimates, .. } = answered;
         let channels = self.channels;
-        let light = |at: usize| LightComparison {
-            unshadowed: unshadowed[at],
-            estimate: estimates.get(at).copied().unwrap_or(Estimate::UNKNOWN),
-            traced: [ratios[at]; 2],
+        let agreed = |i: usize, most: u32| {
+            !answered.checks.is_empty() && agrees(answered, (i, channels), most, self.tolerance)
+        };
+        let light = |i: usize, channel: usize| {
+            let at = i * channels + channel;
+            let estimate = estimates.get(at).copied().unwrap_or(Estimate::UNKNOWN);
+            LightComparison {
+                unshadowed: unshadowed[at],
+                estimate,
+                traced: [ratios[at]; 2],
+                agreed: agreed(i, estimate.order),
+            }
         };
         let note = |(i, point): (usize, &SurfacePoint)| Note {
             pixel: pixels[i],
             point: *point,
-            lights: (i * channels..(i + 1) * channels).map(light).collect(),
+            lights: (0..channels).map(|channel| light(i, channel)).collect(),
             numbers: lights.get(i * channels..(i + 1) * channels).unwrap_or_default().to_vec(),
-            agreed: !answered.checks.is_empty() && agrees(answered, i, channels, self.tolerance),
+            agreed: agreed(i, u32::MAX),
         };
         let notes = points.iter().enumerate().map(note);
         self.notes.lock().unwrap_or_else(PoisonError::into_inner).extend(notes);

@@ -12,8 +12,9 @@ pub const STEPS: usize = 24;
 /// Half an octave of the risk in its third power.
 const HALF_OCTAVE_CUBED: f32 = 2.828_427;
 /// Number of steps of all scales. Points seen directly have two scales: one for differences that noise can explain,
-/// and one for detail, which noise cannot explain. Points seen in mirrors and through glass have two more.
-pub const LEVELS: usize = 4 * STEPS;
+/// and one for detail, which noise cannot explain. Points seen in mirrors and through glass have two more. Where further
+/// lights of the point are riskier there are as many again.
+pub const LEVELS: usize = 8 * STEPS;
 /// A risk above this many standard deviations of tracing's noise is detail, not noise.
 const MOST_OF_NOISE: f32 = 6.0;
 
@@ -28,18 +29,37 @@ pub struct Features {
     pub wide: f32,
     /// Largest `wide` among the 5 x 5 samples about a tap.
     pub far: f32,
-    /// Standard deviation of a trace with the taps' ratios if its rays were independent; the real rays are spread
-    /// over the light and have less.
-    pub noise: f32,
+    /// Variance of a trace with the taps' ratios if its rays were independent; the real rays are spread
+    /// over the light and have less. Squares of a display step.
+    pub variance: f32,
     /// Radiance without shadows, exposure applied; takes the place of features that are not known.
     pub unshadowed: f32,
     /// Whether the taps surround the point.
     pub is_whole: bool,
     /// Whether a camera ray ends at the point, not one from a mirror or glass.
     pub is_direct: bool,
+    /// Whether the point has further lights.
+    pub is_part: bool,
 }
 
 impl Features {
+    /// The features of no light.
+    pub fn none(is_direct: bool) -> Self {
+        let (bend, wide, far, variance, unshadowed) = (0.0, 0.0, 0.0, 0.0, 0.0);
+        let (is_whole, is_part) = (true, false);
+        Self { bend, wide, far, variance, unshadowed, is_whole, is_direct, is_part }
+    }
+
+    /// Adds further lights of the same point.
+    pub fn add(&mut self, other: &Self) {
+        self.bend += other.bend;
+        self.wide += other.wide;
+        self.far += other.far;
+        self.variance += other.variance;
+        self.unshadowed += other.unshadowed;
+        self.is_whole &= other.is_whole;
+    }
+
     /// The level of risk, below [`LEVELS`].
     pub fn level(&self) -> u8 {
         let cubed = self.risk_cubed();
@@ -49,9 +69,10 @@ impl Features {
             limit *= HALF_OCTAVE_CUBED;
             step += 1;
         }
-        let of_noise = (MOST_OF_NOISE * self.noise).max(CALM);
+        let of_noise = (MOST_OF_NOISE * self.variance.sqrt()).max(CALM);
         let is_detail = cubed > of_noise * of_noise * of_noise;
-        let scale = 2 * usize::from(!self.is_direct) + usize::from(is_detail);
+        let [part, indirect, detail] = [self.is_part, !self.is_direct, is_detail].map(usize::from);
+        let scale = 4 * part + 2 * indirect + detail;
         (scale * STEPS + step) as u8
     }
 
@@ -75,7 +96,18 @@ pub fn shown(radiance: f32) -> f32 {
 
 /// Whether `level` is one of points that camera rays end at, not rays from mirrors or glass.
 pub fn is_direct(level: u8) -> bool {
-    usize::from(level) < 2 * STEPS
+    usize::from(level) / (2 * STEPS) % 2 == 0
+}
+
+/// Whether `level` is one of some of a point's lights, not of all.
+pub fn is_part(level: u8) -> bool {
+    usize::from(level) >= LEVELS / 2
+}
+
+/// The level as risky as `level` of some of a point's lights, or of all.
+pub fn of_lights(level: u8, is_part: bool) -> u8 {
+    let half = (LEVELS / 2) as u8;
+    level % half + if is_part { half } else { 0 }
 }
 
 /// The middle of the risks of `level`, display steps.
@@ -93,10 +125,11 @@ mod tests {
         bend: 0.0,
         wide: 0.0,
         far: 0.0,
-        noise: f32::INFINITY,
+        variance: f32::INFINITY,
         unshadowed: 0.5,
         is_whole: true,
         is_direct: true,
+        is_part: false,
     };
 
     #[test]
@@ -121,21 +154,23 @@ mod tests {
 
     #[test]
     fn detail_has_a_scale_of_its_own() {
-        let even = |risk| Features { bend: risk, wide: risk, far: risk, noise: 1.0, ..CALMEST };
+        let even = |risk| Features { bend: risk, wide: risk, far: risk, variance: 1.0, ..CALMEST };
         let scale = |features: Features| usize::from(features.level()) / STEPS;
         assert_eq!([5.9, 6.1].map(|risk| scale(even(risk))), [0, 1]);
         let specular = |risk| Features { is_direct: false, ..even(risk) };
         assert_eq!([5.9, 6.1].map(|risk| scale(specular(risk))), [2, 3]);
         assert!(is_direct(even(6.1).level()) && !is_direct(specular(5.9).level()));
         // Where nothing differs there is nothing to tell apart.
-        assert_eq!(Features { noise: 0.0, ..even(0.0) }.level(), 0);
+        assert_eq!(Features { variance: 0.0, ..even(0.0) }.level(), 0);
     }
 
     #[test]
     fn the_scale_has_two_ends() {
-        let most = Features { bend: 1e9, wide: 1e9, far: 1e9, noise: 0.0, ..CALMEST };
-        let most = Features { is_direct: false, ..most };
+        let most = Features { bend: 1e9, wide: 1e9, far: 1e9, variance: 0.0, ..CALMEST };
+        let most = Features { is_direct: false, is_part: true, ..most };
         assert_eq!(usize::from(most.level()), LEVELS - 1);
+        assert_eq!(of_lights((LEVELS - 1) as u8, false), (LEVELS / 2 - 1) as u8);
+        assert!(is_part(most.level()) && !is_direct(most.level()));
         let infinite = Features { bend: f32::INFINITY, ..CALMEST };
         assert_eq!(usize::from(infinite.level()), STEPS - 1);
     }

@@ -91,7 +91,7 @@ impl Compatibility {
             Channel::Sky(_) if channels.sky().len() == 1 => "sky".into(),
             Channel::Sky(part) => format!("part {} of the sky", part + 1),
         };
-        let rays = |c| super::rays_of(c, settings).saturating_mul(settings.spp);
+        let rays = |c| super::cost::rays_of(c, settings).saturating_mul(settings.spp);
         Self {
             world: world.into(),
             recentre: settings.rules.recentre,

@@ -160,6 +160,7 @@ impl Made {
         let reuse = ReuseCounts {
             direct_inferred: self.reuse.direct,
             specular_inferred: self.reuse.specular,
+            inferred_in_part: 0,
             ..self.reuse
         };
         Self {

@@ -16,7 +16,7 @@ use crate::inference::{Channels, Inference, TracedPoints};
 use crate::output::WriteOptions;
 use crate::reuse::evidence::Finding;
 use crate::reuse::store::{Compatibility, ReferenceRecord};
-use crate::reuse::{self, Judged, Lookup, Reference};
+use crate::reuse::{self, Judged, Lookup, LookupChannel, Reference};
 use crate::scene::{Camera, Rect};
 use crate::shade::{FrameJob, Progress, Rendered, Reuse};
 use probing::Probed;
@@ -165,8 +165,8 @@ impl<'a> SurfaceReuse<'a> {
         let supplied = self.supplied.map_or(Ok(Vec::new()), nearest)?;
         let references = with_supplied(references, &supplied);
         let settings = self.context.renderer.settings;
-        let rays: Vec<u32> = self.channels.iter().map(|c| reuse::rays_of(c, settings)).collect();
-        let lookup = Lookup { frame, references: &references, rays: &rays };
+        let channels = LookupChannel::all(&self.channels, settings);
+        let lookup = Lookup { frame, references: &references, channels: &channels };
         act((!references.is_empty()).then_some(lookup))
     }
 

@@ -383,14 +383,18 @@ impl Groups {
         rays: u32,
     ) -> Option<CheckRays> {
         let point = self.of_lit[i] as usize;
-        if !self.asked.checks[point * channels..][own.clone()].contains(&true) {
+        let checks = &self.asked.checks[point * channels..][..channels];
+        if !checks[own.clone()].contains(&true) {
             return None;
         }
         let samples = self.asked.points[point].samples;
         let saved = samples.saturating_mul(rays);
         let shown = &self.asked.unshadowed[point * channels..][..channels];
         let sent: f32 = shown[own].iter().sum();
-        let all = check_rays(saved, sent / shown.iter().sum::<f32>());
+        let in_part = shown.iter().zip(checks).any(|(shown, check)| *shown != 0.0 && !check);
+        let inferred = shown.iter().zip(checks).filter(|(_, check)| **check);
+        let share = sent / inferred.map(|(shown, _)| shown).sum::<f32>();
+        let all = check_rays(saved, share, in_part);
         let until =
             |before: u32| (u64::from(before) * u64::from(all) / u64::from(samples)) as usize;
         // A run of a net's points is spread evenly where it starts at a multiple of a power of two.
@@ -493,6 +497,10 @@ impl Groups {
                 let (x, y) = pixels.place(self.pixels[i]);
                 sources.points.push(TracedPoint { x, y, point: *point });
                 let own = i * channels..(i + 1) * channels;
+                let sent = &self.asked.unshadowed[own.clone()];
+                let mut known = self.asked.ratios[own.clone()].iter().zip(sent);
+                let is_known = known.any(|(ratio, sent)| !ratio.is_nan() && *sent != 0.0);
+                counts.inferred_in_part += u64::from(is_known);
                 let gathered = self.gathered[own.clone()].iter().map(Gathered::ratio);
                 let ratios = &mut self.asked.ratios[own];
                 ratios.iter_mut().zip(gathered.clone()).for_each(|(ratio, traced)| {

@@ -11,8 +11,8 @@ use serde::Serialize;
 use std::sync::atomic::AtomicBool;
 
 /// Memory that a reference between key frames takes at most, as a share of a key frame's: 0.07 to 0.22 in
-/// the repository's scenes.
-const BETWEEN: f64 = 0.25;
+/// the repository's scenes, more where a quarter of a tiny frame's pixels are probed.
+const BETWEEN: f64 = 0.3;
 /// Memory of a key frame's reference encoded for disk, likewise: 0.17 to 0.44.
 const WAITING: f64 = 0.5;
 /// Most names of always traced meshes and spheres that are printed.

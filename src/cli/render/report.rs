@@ -105,7 +105,11 @@ fn reused(policy: Policy, counts: &ReuseCounts) -> Option<String> {
         Policy::Colour => "pixels",
         Policy::Surface | Policy::Off => "lit surface points",
     };
-    Some(format!("{all} of the {what} were reused{mirrored}"))
+    let in_part = match counts.inferred_in_part {
+        0 => String::new(),
+        _ => format!(", {} in part", percent(counts.share_in_part()?, 1)),
+    };
+    Some(format!("{all} of the {what} were reused{in_part}{mirrored}"))
 }
 
 /// The warning, with what to do, if the audit's interval shows that inferred frames are less accurate than

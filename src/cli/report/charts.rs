@@ -13,7 +13,7 @@ pub fn all(job: &Job) -> Vec<Chart> {
 
 /// Whether no point of the frame was inferred.
 fn is_traced(row: &Row) -> bool {
-    row.reuse.direct_inferred + row.reuse.specular_inferred == 0
+    !row.reuse.is_inferred()
 }
 
 fn frames(job: &Job) -> Vec<u32> {

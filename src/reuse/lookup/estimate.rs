@@ -41,7 +41,7 @@ impl Largest {
 
 /// The estimate of one light from the taps.
 #[derive(Clone, Copy)]
-pub(super) struct Mean {
+struct Mean {
     /// Weighted mean of the ratios of the taps that know the light.
     ratio: f32,
     /// The largest `bend` of the taps, see [`Contrast`](crate::reuse::reference::Contrast); likewise `wide` and
@@ -55,15 +55,46 @@ pub(super) struct Mean {
     weight: f32,
 }
 
+/// A light of a point, to be put in order.
+struct OrderedLight {
+    /// Those of its estimate.
+    features: Features,
+    /// Its first channel.
+    channel: usize,
+}
+
+/// Room for the lights of a point.
+#[derive(Default)]
+pub(super) struct Buffers {
+    means: Vec<Option<Mean>>,
+    ordered: Vec<OrderedLight>,
+}
+
+impl Mean {
+    /// The features of this estimate alone, of a light that contributes `unshadowed` without shadows, which are `by` display
+    /// steps.
+    fn features(&self, by: f32, unshadowed: f32, none: Features) -> Features {
+        Features {
+            bend: by * self.bend,
+            wide: by * self.wide,
+            far: by * self.far,
+            variance: by * by * self.variance,
+            unshadowed,
+            is_whole: f64::from(self.weight) >= ENOUGH_WEIGHT,
+            ..none
+        }
+    }
+}
+
 impl Lookup<'_> {
     /// Estimates each light at `point`; `shown` are the contributions of the lights to the pixel without
-    /// shadows, `lights` their numbers, if lights are selected. `means` is a buffer to reuse.
+    /// shadows, `lights` their numbers, if lights are selected. `buffers` are used again.
     pub(super) fn estimate_all(
         &self,
         taps: &Taps,
         point: &SurfacePoint,
         (shown, lights): (&[f32], &[u32]),
-        means: &mut Vec<Option<Mean>>,
+        Buffers { means, ordered }: &mut Buffers,
         estimates: &mut [Estimate],
     ) {
         means.clear();
@@ -75,32 +106,40 @@ impl Lookup<'_> {
         means.extend((0..shown.len()).map(mean));
         let seen = means.iter().zip(shown).map(|(mean, s)| mean.map_or(0.0, |m| s * m.ratio));
         let steps = steps_per_radiance(seen.sum());
-        // Lights err together: what is beside a shadow's edge is beside that of the next lamp too.
-        let (bend, wide, far, noise, unshadowed) = (0.0, 0.0, 0.0, 0.0, 0.0);
-        let (is_whole, is_direct) = (true, point.direct);
-        let mut features = Features { bend, wide, far, noise, unshadowed, is_whole, is_direct };
-        let mut variance = 0.0;
-        for (mean, shown) in means.iter().zip(shown).filter(|(_, shown)| **shown != 0.0) {
-            let Some(mean) = mean else { continue };
-            let by = steps * shown;
-            features.bend += by * mean.bend;
-            features.wide += by * mean.wide;
-            features.far += by * mean.far;
-            variance += by * by * mean.variance;
-            features.unshadowed += shown;
-            features.is_whole &= f64::from(mean.weight) >= ENOUGH_WEIGHT;
+        let none = Features::none(point.direct);
+        ordered.clear();
+        for (channel, (mean, shown)) in means.iter().zip(shown).enumerate() {
+            let features = |mean: &Mean| mean.features(steps * shown, *shown, none);
+            let own = mean.as_ref().filter(|_| *shown != 0.0).map_or(none, features);
+            match ordered.last_mut() {
+                Some(light) if !self.channels[channel].is_first => light.features.add(&own),
+                _ => ordered.push(OrderedLight { features: own, channel }),
+            }
         }
-        features.noise = variance.sqrt();
-        let level = features.level();
-        for (estimate, mean) in estimates.iter_mut().zip(&*means) {
-            *estimate = mean.map_or(Estimate::UNKNOWN, |m| Estimate { ratio: m.ratio, level });
+        // Lights err together: what is beside a shadow's edge is beside that of the next lamp too. So no light is judged
+        // without those that send less: its error could be larger than theirs.
+        let sent = |light: &OrderedLight| light.features.unshadowed;
+        ordered.sort_by(|a, b| sent(a).total_cmp(&sent(b)));
+        let (count, mut all) = (ordered.len() as u32, none);
+        for (order, light) in (0..).zip(&*ordered) {
+            all.add(&light.features);
+            all.is_part = order + 1 < count;
+            let level = all.level();
+            for channel in light.channel..means.len() {
+                if channel != light.channel && self.channels[channel].is_first {
+                    break;
+                }
+                if let Some(Mean { ratio, .. }) = means[channel] {
+                    estimates[channel] = Estimate { ratio, level, order };
+                }
+            }
         }
     }
 
     /// The mean for a point of `samples` camera samples; `None` where the taps that know the light have too little
     /// weight.
     fn mean(&self, taps: &Taps, (channel, lights): (usize, &[u32]), samples: u32) -> Option<Mean> {
-        let rays = samples as f32 * self.rays[channel] as f32;
+        let rays = samples as f32 * self.channels[channel].rays as f32;
         let (one, per_ray) = (f32x4::splat(1.0), f32x4::splat(1.0 / (rays + 2.0)));
         let mut first = f32::NAN;
         let mut sums = Sums::default();

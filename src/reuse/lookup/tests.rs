@@ -1,14 +1,17 @@
 //! Samples of other surfaces are not used, and uncertain estimates have a high risk.
 
-use super::Lookup;
+use super::{Judged, Lookup, LookupChannel};
 use crate::film::Provenance;
-use crate::inference::{Estimate, LookupBatch, SurfacePoint, TracedPoint, TracedPoints};
+use crate::inference::{Estimate, Inference, LookupBatch, SurfacePoint, TracedPoint, TracedPoints};
 use crate::math::{DVec3, Vec3};
 use crate::reuse::Reference;
-use crate::reuse::risk::STEPS;
+use crate::reuse::evidence::{Evidence, Finding};
+use crate::reuse::risk::{LEVELS, STEPS, is_part, of_lights};
 use crate::scene::{Camera, Pose};
 
 const EDGE: u32 = 64;
+/// A light of one colour.
+const LIGHT: LookupChannel = LookupChannel { rays: 16, is_first: true };
 
 fn camera() -> Camera {
     let (eye, up) = (DVec3::ZERO, DVec3::Y);
@@ -46,7 +49,7 @@ fn wall(ratio: impl Fn(u32) -> f32) -> Reference {
 
 /// The estimate from `reference` for `point`, whose light has the radiance 1 without shadows.
 fn estimated(reference: &Reference, point: SurfacePoint) -> Estimate {
-    let lookup = Lookup { frame: 2, references: &[reference], rays: &[16] };
+    let lookup = Lookup { frame: 2, references: &[reference], channels: &[LIGHT] };
     let mut asked = LookupBatch {
         points: vec![point],
         pixels: vec![[0; 2]],
@@ -196,33 +199,88 @@ fn noise_and_detail_have_scales_of_their_own() {
     assert!(!is_detail(&specks, 20.2));
 }
 
-/// A lamp that errs makes what all lamps together are told uncertain.
-#[test]
-fn lights_share_their_level() {
+/// The wall with three channels: lit evenly, at the edge of a shadow, and lit evenly.
+fn wall_with_an_edge() -> Reference {
     let mut traced = TracedPoints::default();
     for (x, y) in (0..EDGE).flat_map(|y| (0..EDGE).map(move |x| (x, y))) {
         let point = on_wall(f64::from(x) + 0.5, f64::from(y) + 0.5);
         traced.points.push(TracedPoint { x, y, point });
-        traced.ratios.extend([1.0, f32::from(u8::from(x < 32))]);
+        traced.ratios.extend([1.0, f32::from(u8::from(x < 32)), 0.5]);
     }
-    let reference = Reference::new(1, &camera(), &traced, 2);
-    let lookup = Lookup { frame: 2, references: &[&reference], rays: &[16, 16] };
-    let level_with = |second: f32, x: f64| {
-        let mut asked = LookupBatch {
-            points: vec![on_wall(x, 20.5)],
-            pixels: vec![[0; 2]],
-            unshadowed: vec![1.0, second],
-            ratios: vec![f32::NAN; 2],
-            estimates: Vec::new(),
-            provenance: vec![Provenance::default()],
-            ..LookupBatch::default()
-        };
+    Reference::new(1, &camera(), &traced, 3)
+}
+
+/// What is asked about a point of the wall where the channels send `unshadowed`.
+fn asked_at(x: f64, unshadowed: [f32; 3]) -> LookupBatch {
+    LookupBatch {
+        points: vec![on_wall(x, 20.5)],
+        refinement: 1.0,
+        pixels: vec![[0; 2]],
+        unshadowed: unshadowed.to_vec(),
+        ratios: vec![f32::NAN; 3],
+        provenance: vec![Provenance::default()],
+        ..LookupBatch::default()
+    }
+}
+
+/// A light that errs makes what it and the weaker ones together are told uncertain, but not these alone.
+#[test]
+fn lights_are_ordered_by_what_they_send() {
+    let reference = wall_with_an_edge();
+    let lookup = Lookup { frame: 2, references: &[&reference], channels: &[LIGHT; 3] };
+    let of = |x: f64, second: f32| {
+        let mut asked = asked_at(x, [1.0, second, 1.0]);
         lookup.estimate(&mut asked);
-        assert_eq!(asked.estimates[0].level, asked.estimates[1].level);
-        asked.estimates[0].level
+        [0, 1, 2].map(|k| asked.estimates[k])
     };
-    assert_eq!(level_with(1.0, 10.5), level_with(0.0, 10.5));
-    assert!(level_with(1.0, 31.5) > level_with(1.0, 10.5));
-    // The second lamp does not shine there.
-    assert_eq!(level_with(0.0, 31.5), level_with(0.0, 10.5));
+    let [first, second, third] = of(31.5, 2.0);
+    assert_eq!([first, second, third].map(|e| e.order), [0, 2, 1]);
+    assert_eq!([first, second, third].map(|e| is_part(e.level)), [true, false, true]);
+    let calm = of_lights(first.level, false);
+    assert!(second.level > calm && third.level == first.level);
+    assert_eq!(of(10.5, 2.0)[1].level, calm, "far from the edge");
+    // A weaker light that errs counts for brighter ones.
+    assert!(of(31.5, 0.5).iter().all(|e| of_lights(e.level, false) > calm));
+    // The second does not shine there.
+    assert_eq!(of(31.5, 0.0)[2].level, calm);
+    // As the second ratio of the first light it counts for that one.
+    let part = LookupChannel { is_first: false, ..LIGHT };
+    let lookup = Lookup { channels: &[LIGHT, part, LIGHT], ..lookup };
+    let mut asked = asked_at(31.5, [1.0; 3]);
+    lookup.estimate(&mut asked);
+    assert_eq!([0, 1, 2].map(|k| asked.estimates[k].order), [1, 1, 0]);
+    assert_eq!(asked.estimates[0].level, asked.estimates[1].level);
+}
+
+/// Where the evidence does not allow all lights of a point, the weaker ones are inferred and checked, if that saves
+/// enough rays.
+#[test]
+fn only_the_brighter_lights_are_traced() {
+    let reference = wall_with_an_edge();
+    let finding = |level: usize, error| {
+        let level = level as u8;
+        Finding { level, agreed: true, error, noise: 1.0 }
+    };
+    let half = LEVELS / 2;
+    let calm = [0, half].map(|scale| vec![finding(scale + 1, 0.0); 100]).concat();
+    let wrong = |level: &usize| level % half > 4;
+    let wrong: Vec<Finding> = (0..LEVELS).filter(wrong).map(|l| finding(l, 100.0)).collect();
+    let some = Evidence::of(calm.iter().chain(&wrong), 0.25);
+    let none = Evidence::of(wrong.iter(), 0.25);
+    let answers = |evidence: &Evidence, x: f64, rays: u32| {
+        let channels = [LookupChannel { rays, ..LIGHT }; 3];
+        let lookup = Lookup { frame: 2, references: &[&reference], channels: &channels };
+        let mut asked = asked_at(x, [0.1, 0.2, 0.1]);
+        let judge = |_| evidence;
+        Judged { lookup: &lookup, evidence: &judge, tolerance: 0.25 }.infer(&mut asked);
+        let checks = asked.checks.iter();
+        assert!(checks.zip(&asked.ratios).all(|(check, ratio)| *check != ratio.is_nan()));
+        [0, 1, 2].map(|k| asked.ratios[k])
+    };
+    assert_eq!(answers(&some, 10.5, 64), [1.0, 1.0, 0.5]);
+    let [first, second, third] = answers(&some, 31.5, 64);
+    assert!((first, third) == (1.0, 0.5) && second.is_nan());
+    for (evidence, x, rays) in [(&some, 31.5, 16), (&none, 10.5, 64), (&none, 31.5, 64)] {
+        assert!(answers(evidence, x, rays).iter().all(|ratio| ratio.is_nan()));
+    }
 }
