@@ -31,10 +31,11 @@ const CALMER: usize = 2;
 /// other frames know. The findings of a point follow one another, that of all lights first.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Finding {
-    /// Level of the estimate's risk: an index into the levels of four scales, one scale after another (detail and all
-    /// else, for points seen directly and for points seen in mirrors or through glass).
+    /// Level of the estimate's risk: an index into the levels of eight scales, one scale after another (detail and all
+    /// else, for points seen directly and for points seen in mirrors or through glass; then the same again for some of a
+    /// point's lights).
     pub level: u8,
-    /// Whether check rays agreed with the estimate.
+    /// Whether check rays agreed with the estimates.
     pub agreed: bool,
     /// Squared error of the estimate, squares of a display step of the pixel; may be negative.
     pub error: f32,
