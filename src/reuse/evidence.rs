@@ -28,7 +28,7 @@ const UNSEEN_SHARE: f64 = 0.5;
 const CALMER: usize = 2;
 
 /// The errors of the estimate and of a trace at a surface point of a probe, summed over some or all of the lights that
-/// other frames know. The findings of a point follow one another, that of all lights first.
+/// other frames know.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Finding {
     /// Level of the estimate's risk: an index into the levels of eight scales, one scale after another (detail and all
@@ -93,36 +93,43 @@ pub fn findings_of(share: f32, lights: &[LightComparison]) -> Vec<Finding> {
     for count in (1..=known.len()).rev() {
         let (own, others) = known.split_at(count);
         // The ratios of one light are used together.
-        let order = |light: &&&LightComparison| light.estimate.order;
-        if own.last().map(|l| order(&l)) == others.first().map(|l| order(&l)) {
+        let order = |light: &LightComparison| light.estimate.order;
+        let (Some(brightest), next) = (own.last(), others.first()) else { continue };
+        if next.is_some_and(|next| order(next) == order(brightest)) {
             continue;
         }
-        let step = |light: &LightComparison| usize::from(light.estimate.level) % STEPS;
-        let riskiest = own.iter().max_by_key(|l| (step(l), l.estimate.order));
-        let (Some(riskiest), Some(highest)) = (riskiest, own.last()) else { continue };
-        if !findings.is_empty() && step(riskiest) + CALMER > last {
-            continue;
-        }
-        last = step(riskiest);
-        let sum = |lights: &[&LightComparison], ratio: &dyn Fn(&LightComparison) -> f32| -> f32 {
-            lights.iter().map(|l| l.unshadowed * ratio(l)).sum()
-        };
-        // The other lights as they are.
-        let rest = sum(others, &|l| 0.5 * (l.traced[0] + l.traced[1]));
-        let shown = |radiance: f32| f64::from(shown(rest + radiance));
-        let estimated = shown(sum(own, &|l| l.estimate.ratio));
-        let [a, b] = [0, 1].map(|k| shown(sum(own, &|l| l.traced[k])));
-        let square = f64::from(share) * f64::from(share);
-        let error = (square * (estimated - a) * (estimated - b)) as f32;
-        let noise = (square * 0.5 * (a - b) * (a - b)) as f32;
-        let level = of_lights(riskiest.estimate.level, !others.is_empty());
-        let agreed = highest.agreed;
-        // Light beyond what f32 holds tells nothing.
-        if error.is_finite() && noise.is_finite() {
-            findings.push(Finding { level, agreed, error, noise });
+        let risk =
+            |light: &LightComparison| (usize::from(light.estimate.level) % STEPS, order(light));
+        let Some(riskiest) = own.iter().max_by_key(|light| risk(light)) else { continue };
+        let (step, _) = risk(riskiest);
+        if others.is_empty() || step + CALMER <= last {
+            last = step;
+            let level = of_lights(riskiest.estimate.level, !others.is_empty());
+            findings.extend(finding_of(share, (own, others), level, brightest.agreed));
         }
     }
     findings
+}
+
+/// The finding of the lights `own` of a point, beside which the `others` are as they are; `None` where light is beyond what
+/// f32 holds.
+fn finding_of(
+    share: f32,
+    (own, others): (&[&LightComparison], &[&LightComparison]),
+    level: u8,
+    agreed: bool,
+) -> Option<Finding> {
+    let sum = |lights: &[&LightComparison], ratio: &dyn Fn(&LightComparison) -> f32| -> f32 {
+        lights.iter().map(|l| l.unshadowed * ratio(l)).sum()
+    };
+    let rest = sum(others, &|l| 0.5 * (l.traced[0] + l.traced[1]));
+    let shown = |radiance: f32| f64::from(shown(rest + radiance));
+    let estimated = shown(sum(own, &|l| l.estimate.ratio));
+    let [a, b] = [0, 1].map(|k| shown(sum(own, &|l| l.traced[k])));
+    let square = f64::from(share) * f64::from(share);
+    let error = (square * (estimated - a) * (estimated - b)) as f32;
+    let noise = (square * 0.5 * (a - b) * (a - b)) as f32;
+    (error.is_finite() && noise.is_finite()).then_some(Finding { level, agreed, error, noise })
 }
 
 /// The levels of risk whose estimates may be used.

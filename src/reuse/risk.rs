@@ -12,8 +12,8 @@ pub const STEPS: usize = 24;
 /// Half an octave of the risk in its third power.
 const HALF_OCTAVE_CUBED: f32 = 2.828_427;
 /// Number of steps of all scales. Points seen directly have two scales: one for differences that noise can explain,
-/// and one for detail, which noise cannot explain. Points seen in mirrors and through glass have two more. Where further
-/// lights of the point are riskier there are as many again.
+/// and one for detail, which noise cannot explain. Points seen in mirrors and through glass have two more. Where brighter
+/// lights of the point are left out there are as many again.
 pub const LEVELS: usize = 8 * STEPS;
 /// A risk above this many standard deviations of tracing's noise is detail, not noise.
 const MOST_OF_NOISE: f32 = 6.0;
@@ -38,7 +38,7 @@ pub struct Features {
     pub is_whole: bool,
     /// Whether a camera ray ends at the point, not one from a mirror or glass.
     pub is_direct: bool,
-    /// Whether the point has further lights.
+    /// Whether brighter lights of the point are left out.
     pub is_part: bool,
 }
 
