@@ -71,7 +71,7 @@ pub fn report(choice: &Choice) {
         size.0, size.1
     );
     println!("of their time over that of the bare C loop, once for each camera sample, on as many");
-    println!("threads; wanted: 2.5 at 16 shadow samples, 3.5 at 100");
+    println!("threads; wanted: 5 at 1 camera and 16 shadow samples, 3.5 at 4 and 16");
     let mut rows = Vec::new();
     for (spp, samples) in [(1, 16), (1, 100), (4, 16), (4, 100)] {
         let settings = set.settings(size, spp, samples);

@@ -1,5 +1,5 @@
 //! `./x accuracy`: what accuracy costs on five scenes of `scenes/`. Sweeps them with the program, and writes the
-//! measured part of `docs/accuracy.md` and its pictures from what came out. Up to an hour a scene; a run
+//! measured part of `docs/accuracy.md` and its pictures from what came out. Up to 90 minutes a scene; a run
 //! that was stopped goes on. The pages of the sweeps lie in `out/accuracy`.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a program for people")]

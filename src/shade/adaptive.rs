@@ -11,7 +11,7 @@
 use crate::math::{Rgb, Vec3};
 use rayon::prelude::*;
 
-/// Pixels whose samples have this standard deviation, in display steps, take all the samples that they may.
+/// Pixels whose samples have this standard deviation, of [`SampleSpread`]'s values, take all the samples that they may.
 const FULL: f32 = 24.0;
 /// Weight of a pixel's own variance beside those of its neighbours.
 const OWN: f32 = 4.0;
@@ -23,7 +23,7 @@ const BEND: f32 = 0.5;
 
 /// Differences among the camera samples that a pixel has so far.
 ///
-/// They are of display values, 0 to 255 with a gamma of 2, each channel clipped.
+/// They are of 255 times the root of radiance, exposure applied and each channel clipped, without a tone curve.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SampleSpread {
     /// How many samples.

@@ -16,7 +16,7 @@ use tweenray::sequence::{
 };
 use tweenray::shade::{FrameJob, Renderer};
 
-/// The scenes of `scenes/`.
+/// Some scenes of `scenes/`.
 pub const SCENES: [&str; 5] =
     ["spheres_on_terrain", "cornell", "reflective_spheres", "demo", "street_at_night"];
 /// Added to a frame's number for random numbers that nothing else in a job uses.
