@@ -56,6 +56,7 @@ fn main() {
         edge: var("EDGE", 64),
         frames: var("FRAMES", 9),
         spp: var("SPP", 1),
+        most_spp: Some(var("MOST", 0)).filter(|most| *most > 0),
         share: var("SHARE", 0.03),
         best: var("BEST", 128),
     };

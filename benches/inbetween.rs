@@ -23,28 +23,7 @@ mod parts;
 mod sharpness;
 mod support;
 
-/// What the command line chose.
-pub struct Choice {
-    threads: usize,
-    size: Option<(u32, u32)>,
-    scene: Option<String>,
-    spp: u32,
-    all: bool,
-}
-
-impl Choice {
-    /// The chosen size; else the full one where all is wanted, `small` where not.
-    fn size(&self, small: (u32, u32)) -> (u32, u32) {
-        self.size.unwrap_or(if self.all { (640, 360) } else { small })
-    }
-
-    /// Whether `scene` is wanted.
-    fn takes(&self, scene: &str) -> bool {
-        self.scene.as_ref().is_none_or(|wanted| wanted == scene)
-    }
-}
-
-type Section = (&'static str, fn(&Choice));
+use support::sections::{self, Choice, Section};
 
 const SECTIONS: [Section; 10] = [
     ("quality", accuracy::quality),
@@ -60,36 +39,7 @@ const SECTIONS: [Section; 10] = [
 ];
 
 fn main() {
-    support::title("inbetween");
-    let mut choice = Choice { threads: 2, size: None, scene: None, spp: 1, all: false };
-    let mut picked = Vec::new();
-    let mut words = std::env::args().skip(1).filter(|word| word != "--bench");
-    while let Some(word) = words.next() {
-        let mut value = || words.next().expect("a value behind the option");
-        match word.as_str() {
-            "--all" => choice.all = true,
-            "--threads" => choice.threads = value().parse().expect("a number of threads"),
-            "--spp" => choice.spp = value().parse().expect("a number of camera samples"),
-            "--scene" => choice.scene = Some(value()),
-            "--size" => choice.size = Some(size(&value())),
-            name => match SECTIONS.iter().find(|(known, _)| *known == name) {
-                Some(section) => picked.push(*section),
-                None => panic!("'{name}' is none of {:?}", SECTIONS.map(|(name, _)| name)),
-            },
-        }
-    }
-    let sections = if picked.is_empty() { SECTIONS.to_vec() } else { picked };
-    println!("{} threads", choice.threads);
-    for (name, run) in sections {
-        println!("\n-- {name}");
-        let seconds = support::seconds(|| run(&choice));
-        println!("({seconds:.0} s; load average {})", support::load_average());
-    }
-}
-
-fn size(text: &str) -> (u32, u32) {
-    let parts = text.split_once('x').expect("a size such as 640x360");
-    (parts.0.parse().expect("a width"), parts.1.parse().expect("a height"))
+    sections::run("inbetween", &SECTIONS);
 }
 
 /// `part` of `all`, per cent; "-" where there is nothing.

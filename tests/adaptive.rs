@@ -3,10 +3,13 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "shows what it measured")]
 
+#[path = "common/adaptive_samples.rs"]
+mod adaptive_samples;
 mod common;
 #[path = "common/moves.rs"]
 mod moves;
 
+use adaptive_samples::{references, uniform};
 use moves::{Set, codes, mean_square, psnr_of};
 use tweenray::film::Film;
 use tweenray::math::Rgb;
@@ -14,17 +17,6 @@ use tweenray::scene::{Policy, Rect, Settings};
 use tweenray::shade::{FrameJob, Known, Sampling};
 
 const SCENES: [&str; 4] = ["cornell", "demo", "reflective_spheres", "spheres_on_terrain"];
-/// Those of `scenes/` that take minutes.
-const SLOW: [&str; 5] = ["courtyard", "foggy_hall", "gallery", "materials", "street_at_night"];
-
-fn mean_samples(film: &Film) -> f64 {
-    let samples = film.samples.as_ref().expect("adaptive");
-    samples.iter().map(|n| f64::from(*n)).sum::<f64>() / samples.len() as f64
-}
-
-fn uniform(settings: &Settings, spp: u32, seed: u64) -> Settings {
-    Settings { spp, most_spp: None, seed, ..settings.clone() }
-}
 
 /// With as many camera rays, uniform samples are off by more.
 #[test]
@@ -35,7 +27,7 @@ fn errors_are_smaller_than_those_of_as_many_uniform_samples() {
         let base = set.settings((96, 54), 4, 4);
         let settings = Settings { most_spp: Some(32), ..base.clone() };
         let film = stage.traced(&settings, &shot, 8, 8);
-        let spp = mean_samples(&film).ceil() as u32;
+        let spp = film.mean_samples().unwrap().ceil() as u32;
         assert!((4..32).contains(&spp), "{scene}: {spp}");
         let truth = stage.traced(&uniform(&base, 512, 9), &shot, 8, 8);
         let same = stage.traced(&uniform(&base, spp, 0), &shot, 8, 8);
@@ -45,123 +37,12 @@ fn errors_are_smaller_than_those_of_as_many_uniform_samples() {
     }
 }
 
-/// The figures of `docs/accuracy.md`: camera rays for the error of uniform samples, at the samples of light of each
-/// scene file.
-#[test]
-#[ignore = "minutes"]
-fn rays_for_the_error_of_uniform_samples() {
-    const UNIFORM: [u32; 5] = [4, 8, 16, 32, 64];
-    for scene in SCENES.into_iter().chain(SLOW) {
-        let set = Set::load(scene, |_| ());
-        let (stage, shot) = (set.stage(2), set.shot(16));
-        let base = Settings { width: 320, height: 180, ..set.settings.clone() };
-        let truth = stage.traced(&uniform(&base, 512, 77), &shot, 8, 8);
-        let psnr = |film: &Film| psnr_of(&base, film, &truth);
-        let known = UNIFORM.map(|spp| psnr(&stage.traced(&uniform(&base, spp, 0), &shot, 8, 8)));
-        println!("{scene}: uniform {UNIFORM:?}: {known:.1?} dB");
-        for (least, most) in [(2, 32), (4, 16), (4, 32), (4, 64)] {
-            let settings = Settings { spp: least, most_spp: Some(most), ..base.clone() };
-            let film = stage.traced(&settings, &shot, 8, 8);
-            let (own, mean) = (psnr(&film), mean_samples(&film));
-            // Between two known figures the logarithm of the number of samples is interpolated.
-            let at = known.partition_point(|known| *known < own).clamp(1, UNIFORM.len() - 1);
-            let share = (own - known[at - 1]) / (known[at] - known[at - 1]);
-            let equal = f64::from(UNIFORM[at - 1]) * 2f64.powf(share);
-            let rays = 100.0 * mean / equal;
-            println!(
-                "  {least}..{most}: {mean:.2} samples, {own:.1} dB, as {equal:.0} uniform: {rays:.0} % of the rays"
-            );
-        }
-    }
-}
-
-/// PSNR of an adaptive reference with the range that `tweenray accuracy` uses and the scene file's light samples, that of
-/// one with half as many as its most samples in every pixel, and the adaptive one's mean samples.
-fn references(scene: &str, size: (u32, u32), most: u32) -> ([f64; 2], f64) {
-    let set = Set::load(scene, |_| ());
-    let (stage, shot) = (set.stage(2), set.shot(16));
-    let base = Settings { width: size.0, height: size.1, ..set.settings.clone() };
-    let traced = |settings: &Settings| stage.traced(settings, &shot, 8, 8);
-    let truth = traced(&uniform(&base, 8 * most, 77));
-    let range = Settings { spp: most / 8, most_spp: Some(most), seed: 5, ..base.clone() };
-    let adaptive = traced(&range);
-    let same = traced(&uniform(&base, most / 2, 5));
-    ([&adaptive, &same].map(|film| psnr_of(&base, film, &truth)), mean_samples(&adaptive))
-}
-
 #[test]
 fn an_adaptive_reference_is_no_less_accurate() {
     for scene in SCENES {
         let ([adaptive, uniform], mean) = references(scene, (64, 36), 128);
         println!("{scene}: {adaptive:.2} dB with {mean:.1} samples, {uniform:.2} dB with 64");
         assert!(adaptive > uniform && mean < 64.0, "{scene}");
-    }
-}
-
-/// The figures of `docs/accuracy.md` for references.
-#[test]
-#[ignore = "minutes"]
-fn adaptive_references() {
-    for scene in SCENES.into_iter().chain(["courtyard"]) {
-        for most in [128, 256, 512] {
-            let ([adaptive, uniform], mean) = references(scene, (160, 90), most);
-            let ends = [most / 8, most, most / 2];
-            println!(
-                "{scene}: {0}..{1}: {adaptive:.1} dB with {mean:.1} samples; {2}: {uniform:.1} dB",
-                ends[0], ends[1], ends[2]
-            );
-        }
-    }
-}
-
-/// The figures of `docs/accuracy.md` for a choice that knows each pixel's error at every number of samples: no rule
-/// takes fewer rays.
-#[test]
-#[ignore = "minutes"]
-fn the_fewest_rays_that_any_choice_could_take() {
-    const COUNTS: [u32; 6] = [2, 4, 8, 16, 32, 64];
-    const SEEDS: u64 = 5;
-    for scene in SCENES {
-        let set = Set::load(scene, |_| ());
-        let (stage, shot) = (set.stage(2), set.shot(16));
-        let base = Settings { width: 320, height: 180, ..set.settings.clone() };
-        let picture =
-            |spp, seed| codes(&base, &stage.traced(&uniform(&base, spp, seed), &shot, 8, 8));
-        let truth = picture(1024, 99);
-        // Mean squared error of each pixel, for each number of samples.
-        let errors = COUNTS.map(|spp| {
-            let mut sums = vec![0.0; truth.len()];
-            for seed in 1..=SEEDS {
-                for (sum, pair) in sums.iter_mut().zip(picture(spp, seed).iter().zip(&truth)) {
-                    *sum += mean_square(&[*pair.0], &[*pair.1]) / SEEDS as f64;
-                }
-            }
-            sums
-        });
-        let mean =
-            |of: &dyn Fn(usize) -> f64| (0..truth.len()).map(of).sum::<f64>() / truth.len() as f64;
-        for (target, least) in [(16, 2), (16, 4), (64, 2), (64, 4)] {
-            let at = COUNTS.iter().position(|count| *count == target).unwrap();
-            let goal = mean(&|i| errors[at][i]);
-            let counts: Vec<usize> = (0..COUNTS.len()).filter(|k| COUNTS[*k] >= least).collect();
-            // The best choice for a price of a sample (Everett, 1963).
-            let choose = |price: f64, i: usize| {
-                let cost = |k: &usize| errors[*k][i] + price * f64::from(COUNTS[*k]);
-                *counts.iter().min_by(|a, b| cost(a).total_cmp(&cost(b))).unwrap()
-            };
-            let (mut low, mut high) = (1e-14f64, 1e2f64);
-            for _ in 0..80 {
-                let price = (low * high).sqrt();
-                let error = mean(&|i| errors[choose(price, i)][i]);
-                *(if error > goal { &mut high } else { &mut low }) = price;
-            }
-            let rays = mean(&|i| f64::from(COUNTS[choose(low, i)]));
-            let share = 100.0 * rays / f64::from(target);
-            println!(
-                "{scene}: from {least} on, for the error of {target}: {share:.0} % of the rays"
-            );
-            assert!((1.0..100.0).contains(&share));
-        }
     }
 }
 
@@ -292,6 +173,20 @@ fn a_crop_of_an_inferred_frame_has_the_bytes_of_the_whole() {
     }
 }
 
+#[test]
+fn any_number_of_threads_gives_an_inferred_frame_the_same_bytes() {
+    let set = Set::load("reflective_spheres", |_| ());
+    let shot = set.shot(9);
+    let mut settings = Settings { most_spp: Some(16), ..set.settings((101, 77), 4, 64) };
+    settings.reuse.segment = 4;
+    let [one, three] =
+        [1, 3].map(|threads| set.stage(threads).frames(&settings, &shot, &[1, 2, 3, 5]));
+    for (one, three) in one.iter().zip(&three) {
+        assert!(one.film == three.film);
+    }
+    assert!(one[1].reuse.direct_inferred > 0 && one[2].reuse.direct_inferred > 0);
+}
+
 /// Against pictures of many camera samples, so that edges count.
 #[test]
 fn inferred_frames_are_no_worse_than_traced_ones() {
@@ -313,7 +208,7 @@ fn inferred_frames_are_no_worse_than_traced_ones() {
             let truth = stage.traced(&uniform(&off, 128, 5), &shot, frame, frame);
             let traced = stage.frames(&off, &shot, &[frame]).remove(0).film;
             let [own, other] = [film, &traced].map(|film| psnr_of(&settings, film, &truth));
-            let samples = [film, &traced].map(mean_samples);
+            let samples = [film, &traced].map(|film| film.mean_samples().unwrap());
             println!("{scene} {frame}: {own:.2} dB, traced {other:.2}; samples {samples:?}");
             // No worse than tracing, or off by no more than a quarter of a display step.
             let error = |psnr: f64| 10f64.powf(-psnr / 10.0);

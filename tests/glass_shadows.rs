@@ -305,7 +305,7 @@ fn what_is_kept_behind_coloured_glass_can_be_read_back() {
     assert_eq!((channels.len(), channels.colours()), (3, 3));
     let camera = &set.shot.camera(1, 96, 64).unwrap();
     let stage = set.stage(2);
-    let kept = Reuse { channels: &channels, inference: None };
+    let kept = Reuse { channels: &channels, inference: None, is_source: true };
     let job = FrameJob { reuse: Some(kept), ..FrameJob::whole(camera, 1) };
     let traced = &stage.renderer(&settings).render_job(&job, &stage.stop, &()).unwrap().sources;
     let colours = traced.ratios.chunks(3).filter(|ratios| ratios[0] > ratios[2] + 0.1);

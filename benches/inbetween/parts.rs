@@ -95,7 +95,7 @@ impl<'a> Stand<'a> {
         stream: u32,
         inference: Option<&'j dyn Inference>,
     ) -> FrameJob<'j> {
-        let reuse = Some(Reuse { channels: &self.channels, inference });
+        let reuse = Some(Reuse { channels: &self.channels, inference, is_source: true });
         FrameJob { reuse, ..FrameJob::whole(camera, stream) }
     }
 

@@ -6,6 +6,7 @@
 #![allow(clippy::print_stdout, reason = "benches print their figures")]
 
 pub mod camera_rays;
+pub mod sections;
 
 use std::hint::black_box;
 use std::path::Path;

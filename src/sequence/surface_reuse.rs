@@ -176,7 +176,8 @@ impl<'a> SurfaceReuse<'a> {
         inference: Option<&dyn Inference>,
         progress: &dyn Progress,
     ) -> Result<Rendered> {
-        let reuse = Reuse { channels: &self.channels, inference };
+        let is_source = job.beyond_crop || self.terms.is_some();
+        let reuse = Reuse { channels: &self.channels, inference, is_source };
         let reuse = (!self.channels.is_empty()).then_some(reuse);
         self.context.render(&FrameJob { reuse, ..job }, progress)
     }

@@ -471,8 +471,8 @@ impl Groups {
         gathered.all += all;
     }
 
-    /// Moves what was traced to `sources`, counts, tells each pixel where its light is from, and the
-    /// inference what came out.
+    /// Moves what was traced to `sources` if anybody asks for it, counts, tells each pixel where its light is from, and
+    /// the inference what came out.
     pub fn finish(
         &mut self,
         reuse: &Reuse,
@@ -494,8 +494,6 @@ impl Groups {
             let inferred = (!self.traced[i]).then_some(&self.asked.provenance[i]);
             pixels.join_provenance(self.pixels[i], inferred);
             if self.traced[i] && !self.is_blurred(i) {
-                let (x, y) = pixels.place(self.pixels[i]);
-                sources.points.push(TracedPoint { x, y, point: *point });
                 let own = i * channels..(i + 1) * channels;
                 let sent = &self.asked.unshadowed[own.clone()];
                 let mut known = self.asked.ratios[own.clone()].iter().zip(sent);
@@ -506,6 +504,11 @@ impl Groups {
                 ratios.iter_mut().zip(gathered.clone()).for_each(|(ratio, traced)| {
                     *ratio = if traced.is_nan() { *ratio } else { traced };
                 });
+                if !reuse.is_source {
+                    continue;
+                }
+                let (x, y) = pixels.place(self.pixels[i]);
+                sources.points.push(TracedPoint { x, y, point: *point });
                 sources.ratios.extend(gathered);
                 let lights = self.asked.lights.get(i * channels..).unwrap_or_default();
                 sources.lights.extend(lights.iter().take(channels));

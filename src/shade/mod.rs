@@ -128,6 +128,8 @@ pub struct Reuse<'a> {
     pub channels: &'a Channels,
     /// Who knows about surface points; nobody where the frame is traced whole.
     pub inference: Option<&'a dyn Inference>,
+    /// Whether what is traced is kept, as a source for other frames.
+    pub is_source: bool,
 }
 
 /// A frame to render.
@@ -195,7 +197,7 @@ pub struct Rendered {
     pub film: Film,
     /// Rays cast.
     pub rays: RayCounts,
-    /// What was traced of the kept lights: sources for other frames.
+    /// What was traced of the kept lights, if the frame is a source for others.
     pub sources: TracedPoints,
     /// How much was inferred.
     pub reuse: ReuseCounts,

@@ -10,7 +10,7 @@ use tweenray::output::Display;
 use tweenray::reuse::audit::{Rmse, rmse};
 use tweenray::scene::{Camera, CameraPath, ReuseSettings, Scene, Settings, Shot};
 use tweenray::sequence::{FrameContext, FrameMaker, Pyramid, SurfaceReuse};
-use tweenray::shade::{FrameJob, Renderer};
+use tweenray::shade::{FrameJob, Renderer, Sampling};
 use tweenray::stats::AuditSums;
 
 /// How the shots of a trial are rendered.
@@ -19,6 +19,8 @@ pub struct Trial {
     pub edge: u32,
     pub frames: u32,
     pub spp: u32,
+    /// Most camera samples of a pixel, if they differ.
+    pub most_spp: Option<u32>,
     /// Share of the pixels that are probed.
     pub share: f32,
     /// Shadow samples of each of the two converged renders.
@@ -78,6 +80,7 @@ impl Stage<'_> {
             width: trial.edge,
             height: trial.edge,
             spp: trial.spp,
+            most_spp: trial.most_spp,
             shadow_samples: samples,
             sky_samples: samples,
             seed: 1000 + u64::from(number),
@@ -137,7 +140,9 @@ impl Stage<'_> {
             let Some(audit) = made.audit else { continue };
             sums += audit;
             let camera = shot.camera(frame, settings.width, settings.height).expect("a camera");
-            let render = |settings, stream| self.render(settings, &camera, stream);
+            // Each pixel with as many camera samples as it shows: the audit knows nothing of the error at edges.
+            let counts = made.film.samples.as_deref();
+            let render = |settings, stream| self.render_as(settings, &camera, stream, counts);
             let converged = [render(&best, frame | 5 << 27), render(&best, frame | 6 << 27)];
             let traced = render(settings, frame);
             truth.add(settings, &made.film, &traced, &converged);
@@ -149,7 +154,19 @@ impl Stage<'_> {
     }
 
     pub fn render(&self, settings: &Settings, camera: &Camera, stream: u32) -> Film {
-        let job = FrameJob::whole(camera, stream);
+        self.render_as(settings, camera, stream, None)
+    }
+
+    /// With so many camera samples in each pixel, if there are `counts`.
+    fn render_as(
+        &self,
+        settings: &Settings,
+        camera: &Camera,
+        stream: u32,
+        counts: Option<&[u32]>,
+    ) -> Film {
+        let sampling = counts.map_or(Sampling::Neighbours, Sampling::As);
+        let job = FrameJob { sampling, ..FrameJob::whole(camera, stream) };
         let stop = AtomicBool::new(false);
         let render = || self.renderer(settings).render_job(&job, &stop, &());
         self.pool.install(render).expect("not stopped").film

@@ -76,7 +76,7 @@ fn key_bytes(renderer: &Renderer, shot: &Shot, channels: &Channels) -> Result<u6
     for frame in [1, shot.frames.div_ceil(2), shot.frames] {
         let camera = shot.camera(frame, w, h)?;
         let job = FrameJob {
-            reuse: Some(Reuse { channels, inference: None }),
+            reuse: Some(Reuse { channels, inference: None, is_source: true }),
             beyond_crop: true,
             ..FrameJob::whole(&camera, frame)
         };

@@ -78,6 +78,7 @@ pub fn audited_reuse(size: Size) -> Outcome {
         edge: size.of(80, 96),
         frames: size.of(5, 9),
         spp: 1,
+        most_spp: None,
         share: size.of(0.05, 0.03),
         best: size.of(128, 256),
     };
