@@ -26,7 +26,7 @@ fn intervals_hold_the_true_error() {
 /// So they do where pixels take different numbers of camera samples, probes fewer of them than others.
 #[test]
 fn intervals_hold_the_true_error_with_a_range_of_camera_samples() {
-    intervals_hold(&Trial { spp: 2, most_spp: Some(8), ..SMALL }, 60, 55);
+    intervals_hold(&Trial { spp: 2, most_spp: Some(8), ..SMALL }, 30, 27);
 }
 
 /// At least `least` intervals of so many shots hold the truth.
