@@ -124,8 +124,7 @@ fn rays(choice: &Choice) {
 
 /// Median, least and most of `values`.
 fn spread(values: &[f64], digits: usize) -> String {
-    let [low, middle, high] = [0.0, 0.5, 1.0].map(|q| support::quantile(values, q));
-    format!("{middle:.digits$} ({low:.digits$} to {high:.digits$})")
+    support::quantiles(values, [0.0, 0.5, 1.0], digits)
 }
 
 /// Camera rays of a choice that knows each pixel's error at every number of samples: no rule takes fewer.

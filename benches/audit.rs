@@ -1,7 +1,8 @@
 //! How often the audit's intervals hold the true error, over 60 shots of each scene at the default
 //! share, and how wide they are: the full size of `tests/audit.rs`.
 //!
-//! `SCENE`, `SHOTS`, `EDGE`, `FRAMES`, `SPP`, `SHARE`, `BEST` and `THREADS` change what is run.
+//! `SCENE`, `SHOTS`, `EDGE`, `FRAMES`, `SPP`, `MOST` (most camera samples of a pixel), `SHARE`, `BEST` and `THREADS` change what
+//! is run.
 #![allow(clippy::print_stdout, reason = "a bench prints its figures")]
 
 #[allow(dead_code, missing_docs, reason = "the tests use all of it")]

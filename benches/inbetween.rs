@@ -49,6 +49,5 @@ pub fn per_cent(part: u64, all: u64) -> String {
 
 /// Lower quartile, median and upper quartile in words: `2.31 (2.20 to 2.44)`.
 pub fn quartiles(values: &[f64]) -> String {
-    let [low, middle, high] = [0.25, 0.5, 0.75].map(|q| support::quantile(values, q));
-    format!("{middle:.2} ({low:.2} to {high:.2})")
+    support::quantiles(values, [0.25, 0.5, 0.75], 2)
 }

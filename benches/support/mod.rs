@@ -85,6 +85,12 @@ pub fn quantile(values: &[f64], q: f64) -> f64 {
     sorted[low] + part * (sorted[at.ceil() as usize] - sorted[low])
 }
 
+/// Three quantiles of `values` in words, the middle one first: `2.31 (2.20 to 2.44)`.
+pub fn quantiles(values: &[f64], shares: [f64; 3], digits: usize) -> String {
+    let [low, middle, high] = shares.map(|q| quantile(values, q));
+    format!("{middle:.digits$} ({low:.digits$} to {high:.digits$})")
+}
+
 /// Prints a bench's name and the machine's state: figures mean little without.
 pub fn title(name: &str) {
     println!("\n== {name} ==");
