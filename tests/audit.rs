@@ -9,7 +9,7 @@ use shots::{Set, Stage, Trial};
 use std::sync::atomic::AtomicBool;
 use tweenray::math::Rgb;
 use tweenray::measure::Interval;
-use tweenray::reuse::audit::rmse;
+use tweenray::reuse::audit::{is_worse_than_traced, rmse};
 use tweenray::scene::{Rect, ReuseSettings, Settings};
 use tweenray::sequence::{FrameMaker, Made, Pyramid, SurfaceReuse};
 use tweenray::stats::AuditSums;
@@ -33,7 +33,7 @@ fn intervals_hold_the_true_error_with_a_range_of_camera_samples() {
 fn intervals_hold(trial: &Trial, shots: u32, least: u32) {
     let set = Set::load("cornell");
     let stage = set.stage(2);
-    let (mut shown, mut inferred, mut traced, mut width) = (0, 0, 0, 0.0);
+    let (mut shown, mut inferred, mut traced, mut width, mut wronged) = (0, 0, 0, 0.0, 0);
     for number in 0..shots {
         let audited = stage.audited(trial, number);
         assert!(audited.sums.drawn >= 20, "too few to say anything");
@@ -42,10 +42,14 @@ fn intervals_hold(trial: &Trial, shots: u32, least: u32) {
         shown += holds(audited.rmse.shown, audited.truth.shown);
         inferred += holds(audited.rmse.inferred, audited.truth.inferred);
         traced += holds(audited.rmse.traced, audited.truth.traced);
+        let is_worse = audited.truth.shown > audited.truth.traced;
+        wronged += u32::from(is_worse_than_traced(&audited.sums, 0.0, 1) && !is_worse);
         width += (audited.rmse.shown.high - audited.rmse.shown.low) / audited.truth.shown.sqrt();
     }
     println!("{shown} {inferred} {traced} of {shots}");
     assert!(shown >= least && inferred >= least && traced >= least, "{shown} {inferred} {traced}");
+    // Two intervals of 95 % that lie apart by chance are rare.
+    assert!(wronged <= shots / 40, "{wronged} of {shots} are said to be worse than traced");
     // An interval that held everything would say nothing.
     assert!(width / f64::from(shots) < 3.0, "{width}");
 }

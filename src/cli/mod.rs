@@ -5,6 +5,7 @@
 
 mod accuracy;
 mod args;
+mod audited;
 mod choose;
 mod compare;
 mod convert;

@@ -7,6 +7,7 @@ mod standing;
 mod tables;
 
 use super::args::whole;
+use super::audited::worse_than_traced;
 use super::choose::{Choice, asks_for_choice};
 use super::exit::Exit;
 use super::say;
@@ -126,6 +127,7 @@ impl Job {
             effects: tables::effects(self),
             effects_note: tables::EFFECTS_NOTE.into(),
             audit: tables::audit(self),
+            worse: self.worse_than_traced(),
             no_audit: self.why_no_audit().into(),
             timeline: charts::timeline(self),
             ranks: tables::ranks(self),
@@ -195,6 +197,13 @@ impl Job {
         let mut sum = ReuseCounts::default();
         self.rows.iter().for_each(|row| sum += row.reuse);
         sum
+    }
+
+    /// Which inferred frames are less accurate than traced ones.
+    fn worse_than_traced(&self) -> Option<String> {
+        let audit = |row: &Row| Some((row.frame, row.audit?.sums));
+        let audits: Vec<_> = self.rows.iter().filter_map(audit).collect();
+        worse_than_traced(&audits, self.settings.reuse.tolerance)
     }
 
     /// All audits together.

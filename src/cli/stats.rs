@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::output::atomic;
 use crate::output::manifest::{AuditRow, Header};
 use crate::sequence::{FrameReport, Plan, audit_row};
-use crate::stats::{BadSamples, RayCounts, ReuseCounts};
+use crate::stats::{AuditSums, BadSamples, RayCounts, ReuseCounts};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -95,11 +95,19 @@ pub fn reuse_of(outcome: &Outcome) -> ReuseCounts {
 /// The audit of all frames asked for together, rendered now or kept; `None` if none
 /// was audited.
 pub fn audit_of(plan: &Plan, outcome: &Outcome) -> Option<AuditRow> {
-    let rendered = outcome.frames.iter().filter_map(|(_, report)| Some(report.audit?.sums));
-    let mut all = plan.kept_audit.into_iter().chain(rendered);
-    let mut sums = all.next()?;
-    all.for_each(|more| sums += more);
+    let audits = audits_of(plan, outcome);
+    let (_, mut sums) = *audits.first()?;
+    audits[1..].iter().for_each(|(_, more)| sums += *more);
     Some(audit_row(&sums))
+}
+
+/// The audits of the frames asked for, by frame.
+pub fn audits_of(plan: &Plan, outcome: &Outcome) -> Vec<(u32, AuditSums)> {
+    let audit = |report: &FrameReport| Some((report.frame, report.audit?.sums));
+    let rendered = outcome.frames.iter().filter_map(|(_, report)| audit(report));
+    let mut audits: Vec<_> = plan.kept_audits.iter().copied().chain(rendered).collect();
+    audits.sort_by_key(|(frame, _)| *frame);
+    audits
 }
 
 /// Writes the file at `path`, whole. `ranks` starts with rank 0, whose times the top level shows.

@@ -5,7 +5,7 @@ use statrs::function::beta::beta_reg;
 use statrs::function::gamma::checked_gamma_lr;
 
 /// The confidence of every interval here.
-const CONFIDENCE: f64 = 0.95;
+pub const CONFIDENCE: f64 = 0.95;
 
 /// A figure with the interval that holds the truth in 95 of 100 repetitions.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -40,14 +40,14 @@ pub fn proportion_upper_bound(found: u64, n: u64) -> f64 {
 /// truth in 90 % with 1 and in 96 % with 2; in three other scenes in 96 % and more with either.
 const TAIL: f64 = 2.0;
 
-/// The total that parts drawn at random estimate, with its 95 % interval: `sum` of the parts, sum
-/// of their `squares`, the `largest` of them (Fay and Feuer, "Confidence intervals for directly
+/// The total that parts drawn at random estimate, with the interval that contains it with this `confidence`: `sum` of the
+/// parts, sum of their `squares`, the `largest` of them (Fay and Feuer, "Confidence intervals for directly
 /// standardized rates: a method based on the gamma distribution", 1997, with a longer tail).
 ///
 /// The upper end is what the total may be were one more part as large to come. Parts may be
 /// negative; a total may not, and one below 0 counts as 0.
-pub fn drawn_sum_interval(sum: f64, squares: f64, largest: f64) -> Interval {
-    let tail = (1.0 - CONFIDENCE) / 2.0;
+pub fn drawn_sum_interval(sum: f64, squares: f64, largest: f64, confidence: f64) -> Interval {
+    let tail = (1.0 - confidence) / 2.0;
     let estimate = sum.max(0.0);
     let low = gamma_quantile(tail, estimate, squares);
     let more = TAIL * largest.max(0.0);
@@ -142,16 +142,18 @@ mod tests {
 
     #[test]
     fn a_drawn_sum_is_never_below_zero_and_surer_with_more_parts() {
-        let none = drawn_sum_interval(0.0, 0.0, 3.0);
+        let none = drawn_sum_interval(0.0, 0.0, 3.0, CONFIDENCE);
         assert_eq!((none.estimate, none.low), (0.0, 0.0));
         assert!(none.high > 6.0 && none.high.is_finite());
-        let negative = drawn_sum_interval(-2.0, 5.0, 1.0);
+        let negative = drawn_sum_interval(-2.0, 5.0, 1.0, CONFIDENCE);
         assert_eq!((negative.estimate, negative.low), (0.0, 0.0));
         assert!(negative.high > 2.0);
-        let few = drawn_sum_interval(100.0, 1000.0, 10.0);
-        let many = drawn_sum_interval(100.0, 10.0, 0.1);
+        let few = drawn_sum_interval(100.0, 1000.0, 10.0, CONFIDENCE);
+        let many = drawn_sum_interval(100.0, 10.0, 0.1, CONFIDENCE);
         assert!(few.low < many.low && many.low < 100.0);
         assert!(few.high > many.high && many.high > 100.0);
         near(many.high - many.low, 2.0 * 1.96 * 10f64.sqrt(), 0.6);
+        let surer = drawn_sum_interval(100.0, 10.0, 0.1, 0.999);
+        near(surer.high - surer.low, 2.0 * 3.29 * 10f64.sqrt(), 1.0);
     }
 }

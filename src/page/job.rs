@@ -46,6 +46,8 @@ pub struct JobPage {
     pub effects_note: String,
     /// Results of the audits.
     pub audit: Table,
+    /// Which inferred frames are less accurate than traced ones, if they show any.
+    pub worse: Option<String>,
     /// Why they found nothing, where there was none.
     pub no_audit: String,
     /// When each rank rendered what, where the manifest tells.
@@ -91,6 +93,7 @@ struct Html<'a> {
     effects: &'a Table,
     effects_note: &'a str,
     audit: &'a Table,
+    worse: Option<String>,
     no_audit: String,
     ranks: &'a Table,
     command: &'a str,
@@ -128,6 +131,7 @@ impl JobPage {
             effects: &self.effects,
             effects_note: &self.effects_note,
             audit: &self.audit,
+            worse: self.worse.as_deref().map(with_options),
             no_audit: with_options(&self.no_audit),
             ranks: &self.ranks,
             command: &self.command,

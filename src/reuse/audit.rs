@@ -6,7 +6,7 @@
 
 use crate::film::Provenance;
 use crate::math::Rgb;
-use crate::measure::{Interval, drawn_sum_interval};
+use crate::measure::{CONFIDENCE, Interval, drawn_sum_interval};
 use crate::output::Display;
 use crate::stats::{AuditSums, DrawnSum};
 use std::collections::BTreeMap;
@@ -161,10 +161,23 @@ pub struct Rmse {
     pub traced: Interval,
 }
 
-/// The root mean square errors of `sums`; `None` where no pixel was drawn.
+/// The root mean square errors of `sums`, with intervals of 95 %; `None` where no pixel was drawn.
 pub fn rmse(sums: &AuditSums) -> Option<Rmse> {
+    rmse_within(sums, CONFIDENCE)
+}
+
+/// Whether `sums` show that inferred frames are less accurate than traced ones, by more than `tolerance` display steps: the
+/// interval of their error lies above that of tracing. Of as many `audits` one finds this by chance in fewer than 5 %
+/// (Bonferroni's correction).
+pub fn is_worse_than_traced(sums: &AuditSums, tolerance: f32, audits: usize) -> bool {
+    let confidence = 1.0 - (1.0 - CONFIDENCE) / audits.max(1) as f64;
+    rmse_within(sums, confidence)
+        .is_some_and(|rmse| rmse.shown.low > rmse.traced.high.max(tolerance.into()))
+}
+
+fn rmse_within(sums: &AuditSums, confidence: f64) -> Option<Rmse> {
     let over = |drawn: &DrawnSum, pixels: u64| {
-        let total = drawn_sum_interval(drawn.sum, drawn.squares, drawn.largest);
+        let total = drawn_sum_interval(drawn.sum, drawn.squares, drawn.largest, confidence);
         let root = |x: f64| (x / pixels.max(1) as f64).sqrt();
         Interval { estimate: root(total.estimate), low: root(total.low), high: root(total.high) }
     };

@@ -25,8 +25,8 @@ pub struct Plan {
     pub kept: Vec<u32>,
     /// Kept frames with invalid samples, with their numbers of samples.
     pub kept_bad: Vec<(u32, BadSamples)>,
-    /// Sums of the audits of the kept frames, if any was audited.
-    pub kept_audit: Option<AuditSums>,
+    /// Kept frames that were audited, with the sums of their audits.
+    pub kept_audits: Vec<(u32, AuditSums)>,
     /// Frames to render.
     pub render: Vec<u32>,
     /// Notes for the user about frames that are rendered again, damaged ones and others.
@@ -276,9 +276,7 @@ impl Plan {
         for (frame, state) in states {
             match state {
                 State::Whole(bad, audit) => {
-                    if let Some(sums) = audit {
-                        *plan.kept_audit.get_or_insert_default() += sums;
-                    }
+                    plan.kept_audits.extend(audit.map(|sums| (frame, sums)));
                     plan.kept.push(frame);
                     if !bad.is_none() {
                         plan.kept_bad.push((frame, bad));

@@ -268,3 +268,46 @@ fn inspect_says_what_is_always_traced_and_which_box_is_empty() {
     let traced = &json["reuse"]["always_traced"];
     assert_eq!((&traced["meshes"][0], &traced["boxes"]), (&"crate".into(), &2.into()));
 }
+
+/// A frame whose audit finds it less accurate than a traced one is named when the job ends, also if it was kept, and on the
+/// page; with `--strict` the job fails.
+#[test]
+fn inferred_frames_that_are_less_accurate_than_traced_ones_are_named() {
+    let job = Job::new();
+    scene(&job, PAN, "probes = 0.2");
+    let line = "render scene.toml -o o/f_#.png";
+    let worse = "less accurate than";
+    assert!(!job.done(line).err.contains(worse));
+    // As if the audits of frames 3 and 7 had found errors far above those of tracing.
+    let manifest = String::from_utf8(job.read("o/f.manifest.jsonl")).expect("UTF-8");
+    let doctored = |text: &str| {
+        let mut row: Value = serde_json::from_str(text).expect("JSON");
+        let is_meant = row["frame"] == 3 || row["frame"] == 7;
+        if is_meant && row["audit"].is_object() {
+            let sums = &mut row["audit"]["sums"];
+            let traced = sums["traced"].clone();
+            for figure in ["sum", "squares", "largest"] {
+                let of = traced[figure].as_f64().expect("a number");
+                let times = if figure == "squares" { 1e8 } else { 1e4 };
+                sums["shown"][figure] = (of * times).into();
+            }
+        }
+        row.to_string()
+    };
+    let text: Vec<String> = manifest.lines().map(doctored).collect();
+    fs::write(job.path("o/f.manifest.jsonl"), text.join("\n") + "\n").expect("written");
+    let kept = job.done(line);
+    assert!(kept.out.contains("0 rendered, 9 kept"), "{}", kept.out);
+    assert!(
+        kept.err.contains("warning: inferred frames") && kept.err.contains("3, 7"),
+        "{}",
+        kept.err
+    );
+    assert!(kept.err.contains(worse) && kept.err.contains("--policy off"), "{}", kept.err);
+    job.done("report o -o p.html -q");
+    let page = String::from_utf8(job.read("p.html")).expect("UTF-8");
+    assert!(says(&page, "Warning … inferred frames … 3, 7 … <code>--policy</code> off"));
+    let strict = job.run(&format!("{line} --strict"));
+    assert_eq!(strict.code, Some(1), "{}", strict.err);
+    assert!(strict.err.contains("error: inferred frames"), "{}", strict.err);
+}

@@ -3,12 +3,12 @@
 use super::round::{RenderJob, Round};
 use super::site::Site;
 use super::videos;
+use crate::cli::audited::{error_of, worse_than_traced};
 use crate::cli::choose::Judgement;
 use crate::cli::exit::Exit;
 use crate::cli::progress::{duration, percent};
 use crate::cli::{say, stats};
 use crate::error::{Error, Result};
-use crate::output::manifest::AuditRow;
 use crate::scene::Policy;
 use crate::stats::ReuseCounts;
 
@@ -85,7 +85,7 @@ fn finish(job: &RenderJob, round: &Round) -> Result<Exit> {
     let policy = job.setup.settings.reuse.policy;
     reused(policy, &stats::reuse_of(outcome)).map_or(Ok(()), result)?;
     let audit = stats::audit_of(plan, outcome);
-    if let Some(line) = audit.and_then(|audit| audit_line(&audit)) {
+    if let Some(line) = audit.and_then(|audit| error_of(&audit)) {
         result(line)?;
     }
     if job.request.options.video {
@@ -112,45 +112,10 @@ fn reused(policy: Policy, counts: &ReuseCounts) -> Option<String> {
     Some(format!("{all} of the {what} were reused{in_part}{mirrored}"))
 }
 
-/// The warning, with what to do, if the audit's interval shows that inferred frames are less accurate than
-/// traced ones, by more than `tolerance` display steps.
-fn worse_than_traced(audit: &AuditRow, tolerance: f32) -> Option<String> {
-    let ([rmse, low, _], [traced, _, high]) = (audit.rmse?, audit.rmse_traced?);
-    (low > high.max(tolerance.into())).then(|| {
-        format!(
-            "inferred frames are less accurate than traced ones (RMSE {}/255 against {}/255): trace them \
-             with --policy off, or raise --probes",
-            steps(rmse),
-            steps(traced)
-        )
-    })
-}
-
-/// The line about the audit.
-fn audit_line(audit: &AuditRow) -> Option<String> {
-    let ([rmse, low, high], [traced, ..]) = (audit.rmse?, audit.rmse_traced?);
-    Some(format!(
-        "inferred frames: RMSE {}/255 ({}–{}); tracing each frame: {}/255",
-        steps(rmse),
-        steps(low),
-        steps(high),
-        steps(traced)
-    ))
-}
-
-/// Display steps as text, with about two digits.
-fn steps(x: f64) -> String {
-    match x {
-        ..0.0095 => format!("{x:.3}"),
-        ..0.095 => format!("{x:.2}"),
-        _ => format!("{x:.1}"),
-    }
-}
-
 /// Warns if inferred frames are less accurate than traced ones; returns an exit code if that is a failure.
 fn judge_reuse(job: &RenderJob, round: &Round) -> Option<Exit> {
-    let audit = stats::audit_of(&round.plan, &round.outcome)?;
-    complain(job, worse_than_traced(&audit, job.setup.settings.reuse.tolerance)?)
+    let audits = stats::audits_of(&round.plan, &round.outcome);
+    complain(job, worse_than_traced(&audits, job.setup.settings.reuse.tolerance)?)
 }
 
 /// Prints a warning about finished frames, or with `--strict` an error; then returns the exit code.
@@ -184,24 +149,4 @@ fn judge_samples(job: &RenderJob, round: &Round) -> Option<Exit> {
         bad.total()
     );
     complain(job, message)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::stats::AuditSums;
-
-    #[test]
-    fn inferred_frames_are_reported_as_worse_only_beyond_interval_and_tolerance() {
-        let audit = |rmse, traced| AuditRow {
-            rmse: Some(rmse),
-            rmse_inferred_pixels: None,
-            rmse_traced: Some(traced),
-            sums: AuditSums::default(),
-        };
-        let is_worse = |rmse, traced| worse_than_traced(&audit(rmse, traced), 0.25).is_some();
-        assert!(is_worse([5.7, 5.0, 6.4], [2.7, 2.5, 2.9]));
-        assert!(!is_worse([2.9, 2.6, 3.2], [2.7, 2.5, 2.9]), "chance");
-        assert!(!is_worse([0.2, 0.15, 0.24], [0.05, 0.04, 0.06]), "nobody sees it");
-    }
 }
