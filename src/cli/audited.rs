@@ -2,8 +2,7 @@
 
 use super::status::runs;
 use crate::output::manifest::AuditRow;
-use crate::reuse::audit::is_worse_than_traced;
-use crate::sequence::audit_row;
+use crate::reuse::audit::{Rmse, is_worse_than_traced, rmse};
 use crate::stats::AuditSums;
 
 /// The error of the inferred frames together; `None` where no pixel was drawn.
@@ -25,8 +24,7 @@ pub fn worse_than_traced(audits: &[(u32, AuditSums)], tolerance: f32) -> Option<
     let is_worse =
         |(_, sums): &&(u32, AuditSums)| is_worse_than_traced(sums, tolerance, audits.len());
     let worse: Vec<&(u32, AuditSums)> = audits.iter().filter(is_worse).collect();
-    let mut all = AuditSums::default();
-    audits.iter().for_each(|(_, sums)| all += *sums);
+    let all = audits.iter().map(|(_, sums)| *sums).sum();
     let frames: Vec<u32> = worse.iter().map(|(frame, _)| *frame).collect();
     let what = match (is_worse_than_traced(&all, tolerance, 1), frames.len()) {
         (false, 0) => return None,
@@ -39,8 +37,7 @@ pub fn worse_than_traced(audits: &[(u32, AuditSums)], tolerance: f32) -> Option<
             runs(&frames)
         ),
         (false, n) => {
-            let mut together = AuditSums::default();
-            worse.iter().for_each(|(_, sums)| together += *sums);
+            let together = worse.iter().map(|(_, sums)| *sums).sum();
             let (frames, errors) = (runs(&frames), errors(&together)?);
             match n {
                 1 => {
@@ -57,9 +54,8 @@ pub fn worse_than_traced(audits: &[(u32, AuditSums)], tolerance: f32) -> Option<
 
 /// The errors of inferred and of traced frames.
 fn errors(sums: &AuditSums) -> Option<String> {
-    let audit = audit_row(sums);
-    let ([rmse, ..], [traced, ..]) = (audit.rmse?, audit.rmse_traced?);
-    Some(format!("RMSE {}/255 against {}/255", steps(rmse), steps(traced)))
+    let Rmse { shown, traced, .. } = rmse(sums)?;
+    Some(format!("RMSE {}/255 against {}/255", steps(shown.estimate), steps(traced.estimate)))
 }
 
 /// Display steps as text, with about two digits.

@@ -201,17 +201,18 @@ impl Job {
 
     /// Which inferred frames are less accurate than traced ones.
     fn worse_than_traced(&self) -> Option<String> {
-        let audit = |row: &Row| Some((row.frame, row.audit?.sums));
-        let audits: Vec<_> = self.rows.iter().filter_map(audit).collect();
-        worse_than_traced(&audits, self.settings.reuse.tolerance)
+        worse_than_traced(&self.audits(), self.settings.reuse.tolerance)
     }
 
     /// All audits together.
     fn audited(&self) -> Option<AuditSums> {
-        let mut audits = self.rows.iter().filter_map(|row| Some(row.audit?.sums));
-        let mut sums = audits.next()?;
-        audits.for_each(|more| sums += more);
-        Some(sums)
+        let audits = self.audits();
+        (!audits.is_empty()).then(|| audits.iter().map(|(_, sums)| *sums).sum())
+    }
+
+    /// The audits of the frames, by frame.
+    fn audits(&self) -> Vec<(u32, AuditSums)> {
+        self.rows.iter().filter_map(|row| Some((row.frame, row.audit?.sums))).collect()
     }
 }
 

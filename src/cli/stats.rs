@@ -96,9 +96,8 @@ pub fn reuse_of(outcome: &Outcome) -> ReuseCounts {
 /// was audited.
 pub fn audit_of(plan: &Plan, outcome: &Outcome) -> Option<AuditRow> {
     let audits = audits_of(plan, outcome);
-    let (_, mut sums) = *audits.first()?;
-    audits[1..].iter().for_each(|(_, more)| sums += *more);
-    Some(audit_row(&sums))
+    let sums = audits.iter().map(|(_, sums)| *sums).sum();
+    (!audits.is_empty()).then(|| audit_row(&sums))
 }
 
 /// The audits of the frames asked for, by frame.

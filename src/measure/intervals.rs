@@ -4,10 +4,10 @@ use serde::Serialize;
 use statrs::function::beta::beta_reg;
 use statrs::function::gamma::checked_gamma_lr;
 
-/// The confidence of every interval here.
+/// The confidence of the intervals that a page or a manifest tells.
 pub const CONFIDENCE: f64 = 0.95;
 
-/// A figure with the interval that holds the truth in 95 of 100 repetitions.
+/// A figure with the interval that holds the truth, at [`CONFIDENCE`] unless another was asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Interval {
     /// The best estimate.

@@ -2,6 +2,7 @@
 
 use super::RayCounts;
 use serde::{Deserialize, Serialize};
+use std::iter::Sum;
 use std::ops::AddAssign;
 
 /// The total of a figure over many pixels, estimated from those that were drawn with known
@@ -65,5 +66,14 @@ impl AddAssign for AuditSums {
         self.shown += o.shown;
         self.traced += o.traced;
         self.rays += o.rays;
+    }
+}
+
+impl Sum for AuditSums {
+    fn sum<I: Iterator<Item = Self>>(all: I) -> Self {
+        all.fold(Self::default(), |mut sum, one| {
+            sum += one;
+            sum
+        })
     }
 }
