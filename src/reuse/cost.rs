@@ -233,6 +233,16 @@ impl PointCost {
     }
 }
 
+/// Whether lookups of all points would save more than they cost if each estimate held, where a share `known` of the points
+/// has one.
+pub fn could_be_worth_lookups(
+    known: f64,
+    (scene, channels, settings): (&Scene, &Channels, &Settings),
+) -> bool {
+    let cost = PointCost::of(scene, channels, settings, direct_samples(settings));
+    known * (cost.traced - cost.checked) > cost.lookup
+}
+
 /// Whether lookups save more than they cost, by the `findings` of probes, if those estimates are used that
 /// `evidence` allows. A share `probed` of the points is probed, each of which is traced once more.
 pub fn is_worth_lookups<'f>(

@@ -101,6 +101,15 @@ impl<'a> Probe<'a> {
         notes
     }
 
+    /// The share of the recorded points that have an estimate of a light.
+    pub fn known_share(&self) -> f64 {
+        let notes = self.notes.lock().unwrap_or_else(PoisonError::into_inner);
+        let is_known = |note: &&Note| {
+            note.lights.iter().any(|l| l.unshadowed != 0.0 && !l.estimate.ratio.is_nan())
+        };
+        notes.iter().filter(is_known).count() as f64 / notes.len().max(1) as f64
+    }
+
     /// The findings by pixel (column, row). `self` recorded estimates and traces, `other` a second trace of the same
     /// probes with other random numbers. A pixel has `samples` camera samples; the noise of a trace is stated for
     /// `spp` of them.

@@ -159,7 +159,7 @@ fn a_cut_to_another_view_reuses_nothing() {
     let text = text.replace("sky_samples = 16", "sky_samples = 64");
     let floor = "[[mesh]]\nquad = { centre = [300, -1, 0], normal = 'y', size = [20, 20] }\n";
     fs::write(job.path("scene.toml"), text + floor).expect("written");
-    job.done("render scene.toml --frames 2..3 -o o/f_#.png");
+    job.done("render scene.toml --frames 2..3 --probes .003 -o o/f_#.png");
     job.done("render scene.toml --frames 2..3 --policy off -o off/f_#.png");
     let (ours, off) = (frames(&job, "o", 2..=3), frames(&job, "off", 2..=3));
     let reuse = |row: &Value| row["reuse"].clone();
@@ -168,6 +168,14 @@ fn a_cut_to_another_view_reuses_nothing() {
     assert!(reuse(&rows[1])["direct"].as_u64() > Some(0), "{rows:?}");
     assert_eq!(reuse(&rows[1])["direct_inferred"].as_u64(), Some(0));
     assert!(ours[1] == off[1] && ours[0] != off[0]);
+    // Few probes, 6 % of so few pixels, show that there is nothing to infer from.
+    let rays = |row: &Value| {
+        let kinds = row["rays"].as_object().expect("numbers").values();
+        kinds.filter_map(Value::as_f64).sum::<f64>()
+    };
+    let traced = self::rows(&job, "off");
+    let ratio = rays(&rows[1]) / rays(&traced[1]);
+    assert!(ratio < 1.1, "{ratio}");
 }
 
 #[test]

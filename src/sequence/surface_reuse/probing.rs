@@ -14,7 +14,9 @@ use crate::inference::Inference;
 use crate::output::Display;
 use crate::reuse::audit::{self, AuditedFrame, AuditedPixel};
 use crate::reuse::evidence::{Evidence, Finding};
-use crate::reuse::{Judged, Lookup, PARTS, Probe, ProbeDraw, Reference, is_worth_lookups};
+use crate::reuse::{
+    Judged, Lookup, PARTS, Probe, ProbeDraw, Reference, could_be_worth_lookups, is_worth_lookups,
+};
 use crate::scene::Camera;
 use crate::shade::{FrameJob, Known, Rendered, Sampling};
 use crate::stats::{AuditSums, RayCounts};
@@ -24,7 +26,8 @@ use std::sync::Arc;
 /// Added to a frame's number (at most a million) to seed the light samples of the probes' two traces, and of
 /// the audit's. The first, which is shown, has the samples of a traced frame.
 const STREAMS: [u32; 3] = [0, 1 << 31, 3 << 30];
-/// Multiple of the usual share of pixels that is probed, if no, one, or more reference frames have probes.
+/// Multiple of the usual share of pixels that is probed, if no, one, or more reference frames have probes. Where none has,
+/// the usual share comes first: if it finds hardly an estimate, as where frames do not overlap, no more are probed.
 const FIRST: [f64; 3] = [4.0, 2.0, 1.0];
 /// Frames of fewer pixels get as many probes as a frame of this many pixels.
 const LEAST: f64 = 25_000.0;
@@ -39,6 +42,8 @@ pub(super) struct Probed {
     /// For each pixel whether it is a probe.
     mask: Vec<bool>,
     traces: [Rendered; 2],
+    /// The rays of fewer probes that were rendered before, to see whether there are estimates.
+    trial: RayCounts,
     /// For each pixel its number of camera samples; empty where all have as many.
     counts: Vec<u32>,
     /// Findings of the probes, which are stored with the frame's reference.
@@ -88,23 +93,39 @@ impl SurfaceReuse<'_> {
         let usual = f64::from(r.settings.reuse.probes) * (LEAST / pixels).max(1.0);
         let is_worth = |known: &Evidence| is_worth_lookups(known, before(), cast, usual);
         let is_hopeless = known > 0 && !is_worth(&Evidence::of(before(), tolerance));
-        let first = if is_hopeless { HOPELESS } else { FIRST[known.min(FIRST.len() - 1)] };
-        let share = (first * usual).min(MOST);
         // In mirrors and glass the footprint of a pixel is computed from neighbouring pixels.
         let block = if r.plan().mirror || r.plan().glass { 2 } else { 1 };
-        let draw = ProbeDraw::of(r.settings.seed, frame, share, block);
-        let mask = draw.mask(camera.width, camera.height);
-        let trace = |stream: u32, lookup, sampling| {
+        let trace = |mask: &[bool], stream: u32, lookup, sampling| {
             let probe = Probe::new(lookup, self.channels.len(), r.settings.reuse.tolerance);
             let with_gbuffer = self.context.with_gbuffer && stream == STREAMS[0];
-            let job = self.job(camera, frame | stream, &mask);
+            let job = self.job(camera, frame | stream, mask);
             let job = FrameJob { with_gbuffer, sampling, ..job };
             let rendered = self.render(job, Some(&probe as &dyn Inference), &())?;
             Result::Ok((rendered, probe))
         };
-        let (first, own) = trace(STREAMS[0], Some(lookup), Sampling::Own)?;
+        let estimated = |multiple: f64| {
+            let share = (multiple * usual).min(MOST);
+            let draw = ProbeDraw::of(r.settings.seed, frame, share, block);
+            let mask = draw.mask(camera.width, camera.height);
+            let (rendered, probe) = trace(&mask, STREAMS[0], Some(lookup), Sampling::Own)?;
+            Result::Ok((draw, mask, rendered, probe))
+        };
+        let mut trial = RayCounts::default();
+        let (draw, mask, first, own) = match (is_hopeless, known) {
+            (true, _) => estimated(HOPELESS)?,
+            (false, 0) => {
+                let few = estimated(1.0)?;
+                if could_be_worth_lookups(few.3.known_share(), cast) {
+                    trial = few.2.rays;
+                    estimated(FIRST[0])?
+                } else {
+                    few
+                }
+            }
+            (false, _) => estimated(FIRST[known.min(FIRST.len() - 1)])?,
+        };
         let counts = first.sample_counts();
-        let (mut second, again) = trace(STREAMS[1], None, sampling_of(&counts))?;
+        let (mut second, again) = trace(&mask, STREAMS[1], None, sampling_of(&counts))?;
         // Only the first is gone on with.
         second.spreads = Vec::new();
         let samples = |[x, y]: [u32; 2]| {
@@ -122,10 +143,17 @@ impl SurfaceReuse<'_> {
         let evidence = Evidence::of(before().chain(&findings), tolerance);
         // The frame's own probes are traced in any case, so they cost nothing more.
         let is_worth_lookups = is_worth_lookups(&evidence, findings.iter(), cast, 0.0);
-        let traces = [first, second];
-        let probed =
-            Probed { draw, mask, traces, counts, findings, evidence, crossed, is_worth_lookups };
-        let probed = Arc::new(probed);
+        let probed = Arc::new(Probed {
+            draw,
+            mask,
+            traces: [first, second],
+            trial,
+            counts,
+            findings,
+            evidence,
+            crossed,
+            is_worth_lookups,
+        });
         self.with_state(|s| s.probed = Some((frame, Arc::clone(&probed))));
         Ok(probed)
     }
@@ -164,6 +192,7 @@ impl SurfaceReuse<'_> {
         let drawn: Vec<AuditedPixel> = places.iter().map(|i| drawn(*i)).collect();
         let film = &mut rendered.film;
         film.bad += first.film.bad;
+        rendered.rays += probed.trial;
         rendered.rays += first.rays;
         rendered.reuse += first.reuse;
         for trace in &probed.traces {
