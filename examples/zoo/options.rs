@@ -6,10 +6,22 @@ use crate::telling::LONG;
 use clap::Parser;
 use std::path::PathBuf;
 
-/// Renders random scenes and judges what was inferred.
+/// Renders random scenes, or those given, and judges what was inferred.
 #[derive(Parser)]
 #[command(name = "zoo")]
 pub struct Options {
+    /// Judges this scene file, with the camera's own move and its own settings, instead of random scenes; may be repeated
+    ///
+    /// Camera samples are 4 where the file says nothing of them. --frames says into how many frames the whole move is cut:
+    /// the fewer, the further apart they are, and the less is inferred.
+    #[arg(
+        long = "scene",
+        value_name = "FILE",
+        conflicts_with_all = [
+            "seed", "count", "families", "only", "lens", "gloss", "sky", "matter", "fog",
+        ]
+    )]
+    pub scenes: Vec<PathBuf>,
     /// Scenes are a function of this and their index
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
@@ -25,7 +37,7 @@ pub struct Options {
     /// Pixels of a frame; tiles of 32 x 32 are judged
     #[arg(long, default_value = "160x96", value_parser = size)]
     size: [u32; 2],
-    /// Camera samples and light samples of every scene, as 4,16 or 4..16,16, instead of random ones
+    /// Camera samples and light samples of every scene, as 4,16 or 4..16,16, instead of random ones or the file's
     ///
     /// With a range of camera samples the truth has many camera samples of its own, since traced and inferred frames
     /// take different numbers, and errors include those of edges. Uniform samples are rendered too, and the error of the
@@ -65,7 +77,8 @@ impl Options {
     /// Where scenes, pictures and figures go.
     pub fn folder(&self) -> PathBuf {
         let target = std::env::var_os("CARGO_TARGET_DIR").unwrap_or_else(|| "target".into());
-        PathBuf::from(target).join("zoo").join(self.seed.to_string())
+        let own = if self.scenes.is_empty() { self.seed.to_string() } else { "scenes".into() };
+        PathBuf::from(target).join("zoo").join(own)
     }
 
     pub fn plan(&self) -> Plan {

@@ -7,7 +7,7 @@ mod fields;
 mod garbage;
 mod holes;
 mod invariance;
-mod isa;
+pub mod isa;
 mod open;
 mod ranges;
 mod refused;
@@ -65,7 +65,8 @@ fn watertight(
     for centre in [DVec3::ZERO, FAR] {
         for (columns, rows) in columns_rows {
             let scene = shapes::scene_of(shapes::sphere(centre, 2.0, *columns, *rows));
-            let embree = EmbreeIntersector::new(&scene, HitRules::default(), None, 4).unwrap();
+            let embree =
+                EmbreeIntersector::new(&scene, HitRules::default(), suite::isa(), 4).unwrap();
             let make = |i| {
                 let mut rng = suite::rng(1, i);
                 let eye = shapes::in_ball(&mut rng, 0.4);

@@ -1,6 +1,7 @@
 //! `./x stress`: every hard case in full size, as a table. Arguments name cases: `7`, `a`,
 //! `watertight`, `costs` (of the hit rules); `--small` runs the small size, `--list` only names the
-//! cases. A word that names nothing ends it with exit code 2.
+//! cases. `--each-isa` runs the cases of intersection and spawned rays (`a`, `b`) under each instruction set that the
+//! processor has, in place of its best alone. A word that names nothing ends it with exit code 2.
 
 #![allow(
     clippy::unwrap_used,
@@ -44,6 +45,11 @@ const LETTERS: [(&str, &str, &[Case]); 5] = [
 /// Picks the costs of the hit rules.
 const COSTS: &str = "costs";
 
+/// Runs the cases of [`OF_ISA`] under each instruction set.
+const EACH_ISA: &str = "--each-isa";
+/// The letters of the cases whose rays Embree traces as [`suite::isa`] says.
+const OF_ISA: [&str; 2] = ["a", "b"];
+
 /// Whether `name` picks a case of `letter`.
 fn picks(name: &str, letter: &str, case: &Case) -> bool {
     name == letter || name == case.number.to_string() || case.name.contains(name)
@@ -54,7 +60,7 @@ fn main() {
     let (flags, names): (Vec<&str>, Vec<&str>) =
         words.iter().map(String::as_str).partition(|w| w.starts_with("--"));
     let all = || LETTERS.iter().flat_map(|(l, _, cases)| cases.iter().map(move |c| (*l, c)));
-    let unknown_flag = |flag: &&&str| !["--small", "--list"].contains(*flag);
+    let unknown_flag = |flag: &&&str| !["--small", "--list", EACH_ISA].contains(*flag);
     let names_nothing = |name: &&&str| **name != COSTS && !all().any(|(l, c)| picks(name, l, c));
     if let Some(word) = flags.iter().find(unknown_flag).or_else(|| names.iter().find(names_nothing))
     {
@@ -73,40 +79,72 @@ fn main() {
     }
     let size = if flags.contains(&"--small") { Size::Small } else { Size::Full };
     support::title("stress: hard cases");
-    println!("{HEAD}");
-    let (mut run, mut skipped, mut failed) = (0, Vec::new(), Vec::new());
-    for (letter, about, cases) in LETTERS {
-        let cases: Vec<&Case> = cases.iter().filter(|case| wanted(letter, case)).collect();
-        if !cases.is_empty() {
-            println!("{}. {about}", letter.to_uppercase());
-        }
-        for case in cases {
-            let (outcome, seconds) = support::timed(|| (case.run)(size));
-            print_row(case, &outcome, seconds);
-            run += 1;
-            if !outcome.passes() {
-                failed.push(case.number);
-            } else if !outcome.skipped.is_empty() {
-                skipped.push(case.number);
+    let mut tally = Tally::default();
+    let run = |tally: &mut Tally, letters: &[&str]| {
+        println!("{HEAD}");
+        for (letter, about, cases) in LETTERS.iter().filter(|(l, ..)| letters.contains(l)) {
+            let cases: Vec<&Case> = cases.iter().filter(|case| wanted(letter, case)).collect();
+            if !cases.is_empty() {
+                println!("{}. {about}", letter.to_uppercase());
             }
+            cases.into_iter().for_each(|case| tally.run(case, size));
         }
-    }
+    };
     let mut within = true;
-    if names.is_empty() || names.contains(&COSTS) {
-        println!(
-            "\nWhat each hit rule costs: spheres_on_terrain, camera rays on one thread, frames"
-        );
-        println!("of 320 x 180 on all.");
-        within = costs::report(size);
-        run += 1;
+    if flags.contains(&EACH_ISA) {
+        for isa in a_intersection::isa::sets_here() {
+            println!("\nEmbree's {isa}");
+            suite::set_isa(Some(isa));
+            run(&mut tally, &OF_ISA);
+        }
+    } else {
+        run(&mut tally, &LETTERS.map(|(letter, ..)| letter));
+        if names.is_empty() || names.contains(&COSTS) {
+            println!(
+                "\nWhat each hit rule costs: spheres_on_terrain, camera rays on one thread, frames"
+            );
+            println!("of 320 x 180 on all.");
+            within = costs::report(size);
+            tally.cases += 1;
+        }
     }
     let costs = if within { "" } else { "; the rules cost too much" };
-    let (failures, parts) = (failed.len(), skipped.len());
-    let (failed, skipped) = (list(&failed), list(&skipped));
-    println!("\n{run} cases, {failures} failed{failed}, {parts} skipped in part{skipped}{costs}");
+    println!("\n{}{costs}", tally.in_words());
     println!("load average at the end {}", support::load_average());
-    if failures > 0 || !within {
+    if !tally.failed.is_empty() || !within {
         std::process::exit(1);
+    }
+}
+
+/// How the cases came out.
+#[derive(Default)]
+struct Tally {
+    cases: usize,
+    /// Numbers of the cases.
+    failed: Vec<u32>,
+    /// Numbers of the cases of which a part was skipped.
+    skipped: Vec<u32>,
+}
+
+impl Tally {
+    /// Runs a case and prints its row.
+    fn run(&mut self, case: &Case, size: Size) {
+        let (outcome, seconds) = support::timed(|| (case.run)(size));
+        print_row(case, &outcome, seconds);
+        self.cases += 1;
+        if !outcome.passes() {
+            self.failed.push(case.number);
+        } else if !outcome.skipped.is_empty() {
+            self.skipped.push(case.number);
+        }
+    }
+
+    /// `57 cases, 1 failed: 12, 0 skipped in part`
+    fn in_words(&self) -> String {
+        let counted = |numbers: &[u32]| (numbers.len(), list(numbers));
+        let ((failures, failed), (parts, skipped)) =
+            (counted(&self.failed), counted(&self.skipped));
+        format!("{} cases, {failures} failed{failed}, {parts} skipped in part{skipped}", self.cases)
     }
 }
 

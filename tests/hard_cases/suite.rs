@@ -7,6 +7,7 @@
 
 use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
+use std::sync::{Mutex, PoisonError};
 use tweenray::intersect::{Hit, Intersector, Ray};
 use tweenray::stats::RayCounts;
 
@@ -27,6 +28,19 @@ impl Size {
             Self::Full => full,
         }
     }
+}
+
+/// The instruction set that cases of intersection run on.
+static ISA: Mutex<Option<&'static str>> = Mutex::new(None);
+
+/// The instruction set that Embree shall use in cases of intersection and spawned rays; `None` for the machine's best.
+pub fn isa() -> Option<&'static str> {
+    *ISA.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Sets what [`isa`] says.
+pub fn set_isa(isa: Option<&'static str>) {
+    *ISA.lock().unwrap_or_else(PoisonError::into_inner) = isa;
 }
 
 /// A hard case.

@@ -4,7 +4,6 @@ use super::Failure;
 use std::path::Path;
 use tweenray::math::Rgb;
 use tweenray::output::{Display, read_image};
-use tweenray::scene::ToneCurve;
 
 /// Side of a tile, pixels.
 pub const SIDE: usize = 32;
@@ -18,13 +17,12 @@ pub struct Picture {
 }
 
 impl Picture {
-    /// Reads the mean radiance of exr files of one size.
+    /// Reads an exr file as `display` shows it.
     ///
     /// # Errors
-    /// Where one cannot be read.
-    pub fn read(path: &Path) -> Result<Self, Failure> {
+    /// Where it cannot be read.
+    pub fn read(path: &Path, display: &Display) -> Result<Self, Failure> {
         let image = read_image(path)?;
-        let display = Display { exposure: 1.0, tone: ToneCurve::Srgb };
         let code = |c: &Rgb| display.code(*c).map(|x| (255.0 * x) as f32);
         Ok(Self {
             width: image.width as usize,

@@ -2,11 +2,12 @@
 
 use super::Failure;
 use super::frame::Picture;
-use crate::making::Settings;
+use crate::making::{Settings, Subject};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::Instant;
+use tweenray::output::Display;
 
 /// The program to judge.
 pub struct Program {
@@ -85,12 +86,13 @@ pub struct Spent {
     /// What `--stats` wrote.
     pub stats: Value,
     frames: PathBuf,
+    display: Display,
 }
 
 impl Spent {
     /// A frame as displayed.
     pub fn frame(&self, number: usize) -> Result<Picture, Failure> {
-        Picture::read(&self.frames.join(format!("frame_{number:04}.exr")))
+        Picture::read(&self.frames.join(format!("frame_{number:04}.exr")), &self.display)
     }
 
     /// Seconds of reading the scene and building the tree, which every job of it takes.
@@ -121,18 +123,20 @@ impl Program {
         Self { path: path.into() }
     }
 
-    /// Runs it on a scene file in `folder`.
+    /// Runs it on a scene file of `subject` in `folder`.
     pub fn render(
         &self,
         folder: &Path,
         render: &Render,
+        subject: &dyn Subject,
         settings: Settings,
         size: [u32; 2],
     ) -> Result<Spent, Failure> {
         let frames = folder.join(&render.name);
-        let light = (settings.light * render.factor).to_string();
-        let fog =
-            (tweenray::scene::Settings::default().fog_samples as usize * render.factor).to_string();
+        let own = subject.program_settings(settings);
+        let more = |most: u32| (most as usize * render.factor).to_string();
+        // More than the most are no range.
+        let light = |range: String, most| if render.factor == 1 { range } else { more(most) };
         let camera = render.camera.map_or(settings, |spp| settings.uniform(spp)).camera_samples();
         let stats = folder.join(format!("{}.json", render.name));
         let mut command = Command::new(&self.path);
@@ -141,8 +145,9 @@ impl Program {
             .arg(folder.join(&render.scene))
             .args(["--size", &format!("{}x{}", size[0], size[1])])
             .args(["--spp", &camera])
-            .args(["--shadow-samples", &light, "--sky-samples", &light])
-            .args(["--fog-samples", &fog])
+            .args(["--shadow-samples", &light(own.shadow_sample_range(), own.shadow_samples)])
+            .args(["--sky-samples", &light(own.sky_sample_range(), own.sky_samples)])
+            .args(["--fog-samples", &more(own.fog_samples)])
             .args(["--policy", render.policy, "--no-video", "--overwrite", "-q", "--stats"])
             .arg(&stats)
             .arg("-o")
@@ -161,7 +166,8 @@ impl Program {
             return Err(format!("{command:?} ended with {}: {said}", out.status).into());
         }
         let stats = serde_json::from_slice(&std::fs::read(stats)?)?;
-        Ok(Spent { wall, cpu, stats, frames })
+        let display = Display { exposure: own.exposure, tone: own.tone };
+        Ok(Spent { wall, cpu, stats, frames, display })
     }
 }
 

@@ -30,7 +30,7 @@ pub use frame::{Picture, SIDE};
 pub use job::{Program, Spent};
 pub use measure::{FrameFigures, Pictures, Verdict};
 
-use crate::making::{Pose, Settings, Specimen};
+use crate::making::{Settings, Subject};
 use job::Render;
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -64,23 +64,22 @@ pub struct Plan {
 /// Where a render fails or its files cannot be read.
 pub fn judge(
     program: &Program,
-    specimen: &Specimen,
+    subject: &dyn Subject,
     settings: Settings,
     plan: &Plan,
     folder: &Path,
 ) -> Result<Verdict, Failure> {
-    let frames = specimen.poses.len();
-    specimen.write(folder, "move.toml", &specimen.poses, 1)?;
+    let frames = subject.frames();
+    subject.write_frames(folder, "move.toml", &Vec::from_iter(1..=frames), 1)?;
     let judged = choose(frames, plan);
-    let run = |render: Render| program.render(folder, &render, settings, plan.size);
+    let run = |render: Render| program.render(folder, &render, subject, settings, plan.size);
     let inferred = run(Render::of_move("inferred", "surface"))?;
     let traced = run(Render::of_move("traced", "off"))?;
-    let poses: Vec<Pose> = judged.iter().map(|frame| specimen.poses[frame - 1]).collect();
     // Numbers that no frame of the move has, nor another render.
     let first = |k: usize| 1000 * (k + 1);
     let other = |k: usize, name: &str, factor: usize| -> Result<Spent, Failure> {
-        specimen.write(folder, &format!("{name}.toml"), &poses, first(k))?;
-        let render = |factor| Render::of_others(name, [first(k), poses.len()], factor);
+        subject.write_frames(folder, &format!("{name}.toml"), &judged, first(k))?;
+        let render = |factor| Render::of_others(name, [first(k), judged.len()], factor);
         run(match settings.most {
             None => render(factor),
             Some(_) if factor == 1 => render(1).with_seed(first(k)),

@@ -2,12 +2,26 @@
 
 use super::dice::Dice;
 use glam::{DMat3, DVec3};
+use std::fmt::Write;
 
 /// Where a camera stands and what it looks at.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pose {
     pub eye: DVec3,
     pub target: DVec3,
+}
+
+/// The camera's part of a scene file: what it says besides (`own`), and a key pose for frame `first` and each one after it.
+/// Before these the camera rests at `lead`, which must be none of them: frames of one camera are one frame.
+pub fn camera_table(own: &str, keys: &[String], lead: &str, first: usize) -> String {
+    let frames = first + keys.len() - 1;
+    let mut text = format!("[camera]\nframes = {frames}\n{own}");
+    let before = (first > 1).then_some((first - 1, lead));
+    for (frame, key) in before.into_iter().chain((first..).zip(keys.iter().map(String::as_str))) {
+        let at = (frame - 1) as f64 / (frames - 1) as f64;
+        let _ = writeln!(text, "[[camera.keys]]\nat = {at:?}\n{key}");
+    }
+    text
 }
 
 /// What a family offers to cameras.

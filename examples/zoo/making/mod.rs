@@ -13,8 +13,10 @@ mod lamps;
 mod obj;
 mod props;
 mod specimen;
+mod subject;
 
-pub use cameras::Pose;
+pub use cameras::camera_table;
 pub use changes::Change;
 pub use families::FAMILIES;
 pub use specimen::{Settings, Specimen};
+pub use subject::{Label, Subject};

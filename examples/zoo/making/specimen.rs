@@ -1,12 +1,12 @@
 //! One scene of the zoo.
 
 use super::builder::{Builder, triple};
-use super::cameras::{Move, Pose};
+use super::cameras::{Move, Pose, camera_table};
 use super::dice::Dice;
 use super::families::{FAMILIES, Family};
 use super::props;
+use super::subject::{Label, Subject};
 use glam::DVec3;
-use std::fmt::Write;
 use std::path::Path;
 
 /// Samples of a render.
@@ -29,6 +29,18 @@ impl Settings {
     /// The same with as many camera samples in every pixel.
     pub fn uniform(self, spp: usize) -> Self {
         Self { spp, most: None, ..self }
+    }
+
+    /// `own` with these light samples.
+    pub fn light_of(self, own: tweenray::scene::Settings) -> tweenray::scene::Settings {
+        let light = self.light as u32;
+        tweenray::scene::Settings {
+            shadow_samples: light,
+            least_shadow_samples: None,
+            sky_samples: light,
+            least_sky_samples: None,
+            ..own
+        }
     }
 }
 
@@ -102,21 +114,43 @@ impl Specimen {
 
     /// The camera's part of a scene file.
     fn camera(&self, poses: &[Pose], first: usize) -> String {
-        let frames = first + poses.len() - 1;
-        let mut text = format!("[camera]\nfov = {:.3}\nframes = {frames}\n{}", self.fov, self.lens);
-        let at = |frame: usize| (frame - 1) as f64 / (frames - 1) as f64;
-        let mut key = |at: f64, pose: &Pose| {
-            let (eye, target) = (triple(pose.eye), triple(pose.target));
-            let _ = writeln!(text, "[[camera.keys]]\nat = {at:?}\neye = {eye}\ntarget = {target}");
-        };
-        if first > 1 {
-            // Not the first pose itself: frames of one camera are one frame.
-            key(0.0, &Pose { eye: poses[0].eye + DVec3::Y * 0.1, target: poses[0].target });
+        let key =
+            |pose: &Pose| format!("eye = {}\ntarget = {}", triple(pose.eye), triple(pose.target));
+        let keys: Vec<String> = poses.iter().map(key).collect();
+        let lead = Pose { eye: poses[0].eye + DVec3::Y * 0.1, ..poses[0] };
+        let own = format!("fov = {:.3}\n{}", self.fov, self.lens);
+        camera_table(&own, &keys, &key(&lead), first)
+    }
+}
+
+impl Subject for Specimen {
+    fn label(&self) -> Label {
+        Label {
+            index: self.index,
+            family: FAMILIES[self.family].name.into(),
+            name: self.name.clone(),
+            kind: self.kind.name(),
+            folder: format!("{:04}", self.index),
         }
-        for (i, pose) in poses.iter().enumerate() {
-            key(at(first + i), pose);
-        }
-        text
+    }
+
+    fn settings(&self) -> Settings {
+        self.settings
+    }
+
+    fn frames(&self) -> usize {
+        self.poses.len()
+    }
+
+    fn write_frames(
+        &self,
+        folder: &Path,
+        name: &str,
+        frames: &[usize],
+        first: usize,
+    ) -> std::io::Result<()> {
+        let poses: Vec<Pose> = frames.iter().map(|frame| self.poses[frame - 1]).collect();
+        self.write(folder, name, &poses, first)
     }
 }
 

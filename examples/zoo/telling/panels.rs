@@ -2,6 +2,7 @@
 
 use super::record::Told;
 use crate::judging::{Failure, Picture, Pictures, Verdict};
+use crate::making::Label;
 use image::{Rgb, RgbImage};
 use std::path::Path;
 
@@ -88,7 +89,7 @@ pub fn name_the_worst(told: &[Told], folder: &Path) {
         "\nworst scenes: inferred | traced | truth | errors of inferred and of traced, 8 times"
     );
     for t in order.iter().take(10) {
-        let path = folder.join(format!("{:04}/panels.png", t.index));
-        println!("{} {}: {}", t.index, t.name, path.display());
+        let Label { index, name, folder: own, .. } = &t.label;
+        println!("{index} {name}: {}", folder.join(own).join("panels.png").display());
     }
 }

@@ -1,7 +1,7 @@
 //! The figures of one scene, without its pictures.
 
 use crate::judging::{FrameFigures, Verdict};
-use crate::making::{FAMILIES, Settings, Specimen};
+use crate::making::{Label, Settings};
 use serde::Serialize;
 
 /// Over the lines of [`Told::line`].
@@ -11,11 +11,8 @@ pub const HEAD: &str = "index family          move      spp,light    dB  RMSE in
 /// A scene's figures.
 #[derive(Serialize)]
 pub struct Told {
-    pub index: u64,
-    pub family: &'static str,
-    pub name: String,
-    #[serde(rename = "move")]
-    pub kind: &'static str,
+    #[serde(flatten)]
+    pub label: Label,
     pub spp: String,
     pub light: usize,
     pub frames: Vec<Frame>,
@@ -102,13 +99,10 @@ impl Frame {
 
 impl Told {
     /// The verdict's figures.
-    pub fn new(specimen: &Specimen, settings: Settings, verdict: &Verdict) -> Self {
+    pub fn new(label: Label, settings: Settings, verdict: &Verdict) -> Self {
         let jobs = &verdict.jobs;
         Self {
-            index: specimen.index,
-            family: FAMILIES[specimen.family].name,
-            name: specimen.name.clone(),
-            kind: specimen.kind.name(),
+            label,
             spp: settings.camera_samples(),
             light: settings.light,
             frames: verdict.frames.iter().map(Frame::new).collect(),
@@ -156,7 +150,7 @@ impl Told {
             let [x, y] = t.place;
             format!("{:6.2}/{:<5.2} f{} {x},{y}", t.rmse_inferred, t.rmse_traced, t.frame)
         });
-        let Some(worst) = self.worst() else { return self.name.clone() };
+        let Some(worst) = self.worst() else { return self.label.name.clone() };
         let audit = match &self.audit {
             None => "  -  ".into(),
             Some(a) => format!("{:5.2}{}", a.rmse[0], if a.holds { ' ' } else { '!' }),
@@ -167,9 +161,9 @@ impl Told {
         });
         format!(
             "{:5} {:15} {:9} {:>2},{:<3} {:+8.2}  {:6.2}/{:<6.2}  {tile:24}  {:4.1}/{:<4.1} {:6.2}  {} {}  {:5.2}  {audit}  {}/{} of {}{gains}",
-            self.index,
-            self.name,
-            self.kind,
+            self.label.index,
+            self.label.name,
+            self.label.kind,
             self.spp,
             self.light,
             worst.db,

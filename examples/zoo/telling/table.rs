@@ -1,19 +1,18 @@
 //! The table by family.
 
 use super::record::{Frame, Told};
-use crate::making::FAMILIES;
+use std::collections::BTreeSet;
 use std::fmt::Write;
 
-/// A row for each family that has a scene, and one for all.
+/// A row for each family, in the order of their first scenes, and one for all.
 pub fn table(told: &[Told]) -> String {
     let mut text = String::from(
         "family          scenes frames  strict  kept   worst dB  median  worst tile   flicker  told %   speed\n",
     );
-    for family in &FAMILIES {
-        let of: Vec<&Told> = told.iter().filter(|t| t.family == family.name).collect();
-        if !of.is_empty() {
-            row(&mut text, family.name, &of);
-        }
+    let mut seen = BTreeSet::new();
+    for family in told.iter().map(|t| &t.label.family).filter(|family| seen.insert(*family)) {
+        let of: Vec<&Told> = told.iter().filter(|t| t.label.family == *family).collect();
+        row(&mut text, family, &of);
     }
     row(&mut text, "all", &told.iter().collect::<Vec<_>>());
     text

@@ -73,7 +73,7 @@ fn ray_at([a, b, c]: &[DVec3; 3], rng: &mut impl Rng) -> Ray {
 fn measure(i: u64, rules: HitRules) -> Accuracy {
     let scene = shapes::world_of(triangles(i)).into_scene(rules.recentre).unwrap();
     let mesh = &scene.meshes[0];
-    let embree = EmbreeIntersector::new(&scene, rules, None, 1).unwrap();
+    let embree = EmbreeIntersector::new(&scene, rules, suite::isa(), 1).unwrap();
     let mut found = Accuracy::default();
     for prim in 0..GROUP as usize {
         let aimed = mesh.corners(prim);

@@ -47,7 +47,7 @@ fn lowest_wins(outcome: &mut Outcome, size: Size) {
     let stacked = stack(0, COPIES).into_scene(true).unwrap();
     let doubled = shapes::scene_of(doubled);
     for (name, scene) in [("meshes", &stacked), ("faces of a mesh", &doubled)] {
-        let embree = EmbreeIntersector::new(scene, HitRules::default(), None, 4).unwrap();
+        let embree = EmbreeIntersector::new(scene, HitRules::default(), suite::isa(), 4).unwrap();
         let oracle = Oracle::new(scene);
         let rays = size.of(4_000, 200_000);
         let make = |i: u64| {
@@ -101,8 +101,10 @@ fn same_image(outcome: &mut Outcome, size: Size) {
 
 fn image(job: &Job, scene: &Scene, threads: usize) -> Vec<Rgb> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-    let intersector = tweenray::intersect::build(scene, &job.settings, threads).unwrap();
-    let renderer = Renderer::new(scene, &job.settings, &*intersector);
+    let isa = suite::isa().map(Into::into);
+    let settings = tweenray::scene::Settings { isa, ..job.settings.clone() };
+    let intersector = tweenray::intersect::build(scene, &settings, threads).unwrap();
+    let renderer = Renderer::new(scene, &settings, &*intersector);
     let never = std::sync::atomic::AtomicBool::new(false);
     pool.install(|| renderer.render(&job.camera, 1, false, &never, &())).unwrap().0.rgb
 }
@@ -122,7 +124,8 @@ pub fn in_plane(size: Size) -> Outcome {
     for [e1, e2] in planes {
         for wall in [false, true] {
             let scene = sheet(e1, e2, wall);
-            let embree = EmbreeIntersector::new(&scene, HitRules::default(), None, 1).unwrap();
+            let embree =
+                EmbreeIntersector::new(&scene, HitRules::default(), suite::isa(), 1).unwrap();
             let oracle = Oracle::new(&scene);
             for i in 0..size.of(400, 100_000) {
                 // Multiples of 1/64 keep every point and direction exactly in the plane.

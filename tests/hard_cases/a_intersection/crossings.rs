@@ -31,7 +31,7 @@ pub fn parity(size: Size) -> Outcome {
         ("torus", torus(columns, columns / 3)),
     ] {
         let scene = shapes::scene_of(mesh);
-        let embree = EmbreeIntersector::new(&scene, HitRules::default(), None, 4).unwrap();
+        let embree = EmbreeIntersector::new(&scene, HitRules::default(), suite::isa(), 4).unwrap();
         let fans = Fans::of(&scene);
         for aim in [Aim::Vertex, Aim::Edge, Aim::Anywhere] {
             let rays = size.of(4_000, 1_000_000 / 6 + 1);

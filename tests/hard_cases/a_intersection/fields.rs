@@ -59,7 +59,7 @@ pub fn vertex_perspective(size: Size) -> Outcome {
     };
     let leaks = |rules: HitRules, rays: u64, one_by_one: bool| {
         let scene = world.clone().into_scene(rules.recentre).unwrap();
-        let embree = EmbreeIntersector::new(&scene, rules, None, 4).unwrap();
+        let embree = EmbreeIntersector::new(&scene, rules, suite::isa(), 4).unwrap();
         let single = OneByOne(&embree);
         let tracer: &dyn Intersector = if one_by_one { &single } else { &embree };
         suite::misses(tracer, rays, |i| {
@@ -164,14 +164,14 @@ pub fn structured_grid(size: Size) -> Outcome {
     {
         let grid = Grid::new(size.of(64, 256), axis, height);
         let scene = grid.world.clone().into_scene(true).unwrap();
-        let embree = EmbreeIntersector::new(&scene, HitRules::default(), None, 4).unwrap();
+        let embree = EmbreeIntersector::new(&scene, HitRules::default(), suite::isa(), 4).unwrap();
         // From near, from far (where the eye is moved up), from either side.
         for distance in [300.0, -300.0, 1e6] {
             outcome.count(grid.rays(), grid.wrong(&scene, &embree, distance));
             outcome.count(grid.rays(), grid.wrong(&scene, &OneByOne(&embree), distance));
         }
         let raw = grid.world.clone().into_scene(false).unwrap();
-        let embree = EmbreeIntersector::new(&raw, stock(true), None, 4).unwrap();
+        let embree = EmbreeIntersector::new(&raw, stock(true), suite::isa(), 4).unwrap();
         stock_wrong += grid.wrong(&raw, &embree, 300.0);
         // Without a BVH.
         let small = Grid::new(size.of(16, 64), axis, height);

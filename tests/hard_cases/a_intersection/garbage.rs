@@ -157,7 +157,7 @@ fn traced(name: &str, mut world: World, rays: u64) -> Outcome {
         });
     }
     let scene = job.world.into_scene(true).unwrap();
-    let embree = EmbreeIntersector::new(&scene, HitRules::default(), None, 1).unwrap();
+    let embree = EmbreeIntersector::new(&scene, HitRules::default(), suite::isa(), 1).unwrap();
     let make = |i: u64| random_ray(&scene, i);
     let judge = |rays: &[Ray], hits: &[Option<Hit>]| sound(name, &scene, rays, hits);
     let sum = |mut a: Outcome, b: Outcome| {
@@ -305,7 +305,7 @@ fn garbage(i: u64, limit: f64) -> Fate {
 
 /// Ordinary rays, every tenth of random bits where `wild`.
 fn trace_garbage(scene: &Scene, seed: u64, wild: bool) -> (f64, Outcome) {
-    let embree = EmbreeIntersector::new(scene, HitRules::default(), None, 1).unwrap();
+    let embree = EmbreeIntersector::new(scene, HitRules::default(), suite::isa(), 1).unwrap();
     let mut rng = suite::rng(22, seed);
     let mut rays: Vec<Ray> =
         (0..GARBAGE_RAYS).map(|i| random_ray(scene, i + seed * GARBAGE_RAYS)).collect();

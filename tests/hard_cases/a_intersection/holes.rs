@@ -119,7 +119,7 @@ impl Subject {
         let mut world = shapes::world_of(self.mesh.clone());
         world.meshes[0].positions.iter_mut().for_each(|p| *p *= scale);
         let scene = world.into_scene(true).unwrap();
-        let embree = EmbreeIntersector::new(&scene, HitRules::default(), None, 4).unwrap();
+        let embree = EmbreeIntersector::new(&scene, HitRules::default(), suite::isa(), 4).unwrap();
         let oracle = Oracle::new(&scene);
         let single = OneByOne(&embree);
         let tracer: &dyn Intersector = if one_by_one { &single } else { &embree };

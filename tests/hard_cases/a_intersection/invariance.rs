@@ -2,7 +2,7 @@
 
 use crate::common::{self, Job};
 use crate::shapes;
-use crate::suite::{Outcome, Size};
+use crate::suite::{self, Outcome, Size};
 use tweenray::film::Film;
 use tweenray::math::{DAffine3, DVec3, Rgb, Vec3};
 use tweenray::output::Display;
@@ -98,7 +98,8 @@ fn moved(job: &Job, transform: &DAffine3, scale: f64) -> Job {
 }
 
 fn render(job: &Job, rules: HitRules) -> Film {
-    let settings = tweenray::scene::Settings { rules, ..job.settings.clone() };
+    let isa = suite::isa().map(Into::into);
+    let settings = tweenray::scene::Settings { rules, isa, ..job.settings.clone() };
     common::render(&Job { world: job.world.clone(), camera: job.camera, settings }).0
 }
 

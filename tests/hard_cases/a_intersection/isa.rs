@@ -16,7 +16,7 @@ use tweenray::stats::RayCounts;
 const SETS: [&str; 4] = ["sse4.2", "avx", "avx2", "avx512"];
 
 /// The instruction sets that the processor has, of those that Embree is built for.
-pub(super) fn sets_here() -> Vec<&'static str> {
+pub fn sets_here() -> Vec<&'static str> {
     SETS.into_iter().filter(|set| runs_here(set)).collect()
 }
 

@@ -76,7 +76,7 @@ fn tally(scene: &Scene, rules: HitRules, rays: u64) -> Tally {
     let path = CameraPath::Still(Pose { eye, target, up, roll_degrees: 0.0 });
     let shot = Shot::new(path, 1, 50.0);
     let settings = Settings { rules, ..Settings::default() };
-    let product = EmbreeIntersector::new(scene, rules, None, 2).unwrap();
+    let product = EmbreeIntersector::new(scene, rules, suite::isa(), 2).unwrap();
     let oracle = Oracle::new(scene);
     let check = Check::new(scene, &settings, &shot, &product, &oracle);
     check.run(rays, &AtomicBool::new(false), &|_| ())

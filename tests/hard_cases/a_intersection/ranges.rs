@@ -25,7 +25,7 @@ fn ball(centre: DVec3, radius: f64) -> WorldMesh {
 
 /// Holes of the sphere at the origin, seen from inside at random, at vertices and along edges.
 fn holes(scene: &Scene, rules: HitRules, radius: f64, rays: u64) -> u64 {
-    let embree = EmbreeIntersector::new(scene, rules, None, 4).unwrap();
+    let embree = EmbreeIntersector::new(scene, rules, suite::isa(), 4).unwrap();
     let mesh = &scene.meshes[0];
     suite::misses(&embree, rays, |i| {
         let mut rng = suite::rng(14, i);
@@ -159,7 +159,7 @@ fn mixed(outcome: &mut Outcome, size: Size) {
 
 /// Rays from three radii away at the inner half of the small thing that do not hit it.
 fn missed_small(scene: &Scene, small: Small, centre: DVec3, radius: f64, rays: u64) -> u64 {
-    let embree = EmbreeIntersector::new(scene, HitRules::default(), None, 2).unwrap();
+    let embree = EmbreeIntersector::new(scene, HitRules::default(), suite::isa(), 2).unwrap();
     let geom = if small == Small::Mesh { 1 } else { scene.sphere_geom_id() };
     let make = |i: u64| {
         let mut rng = suite::rng(15, i);

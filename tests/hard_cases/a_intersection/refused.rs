@@ -2,7 +2,7 @@
 
 use crate::common;
 use crate::shapes;
-use crate::suite::{Outcome, Size};
+use crate::suite::{self, Outcome, Size};
 use std::path::Path;
 use std::process::Command;
 use std::time::Instant;
@@ -76,7 +76,7 @@ fn placed(scene: &Scene, ray: &Ray) -> Ray {
 pub fn invalid_rays(size: Size) -> Outcome {
     let mut outcome = Outcome::default();
     let scene = ball();
-    let embree = EmbreeIntersector::new(&scene, HitRules::default(), None, 1).unwrap();
+    let embree = EmbreeIntersector::new(&scene, HitRules::default(), suite::isa(), 1).unwrap();
     let oracle = Oracle::new(&scene);
     for intersector in [&embree as &dyn Intersector, &oracle] {
         for (name, ray, expect) in table() {
@@ -235,7 +235,7 @@ fn worker_modes() -> Vec<u32> {
 /// Every answer to the table, and a frame of 64 x 64 pixels with lights of all kinds.
 fn ftz_payload() -> Vec<u8> {
     let scene = ball();
-    let embree = EmbreeIntersector::new(&scene, HitRules::default(), None, 1).unwrap();
+    let embree = EmbreeIntersector::new(&scene, HitRules::default(), suite::isa(), 1).unwrap();
     let mut payload = String::new();
     for (name, ray, _) in table() {
         for (how, hit, occluded, refused) in answers(&embree, &placed(&scene, &ray)) {

@@ -38,7 +38,7 @@ fn cube_on_ground(distance: f64, spread: f64, rays: u64) -> Outcome {
     world.meshes.push(common::quad(corners, 0));
     world.meshes.push(common::cube(DVec3::Y * HALF, HALF, 0));
     let scene = world.into_scene(true).unwrap();
-    let embree = EmbreeIntersector::new(&scene, HitRules::default(), None, 1).unwrap();
+    let embree = EmbreeIntersector::new(&scene, HitRules::default(), suite::isa(), 1).unwrap();
     let oracle = Oracle::new(&scene);
     let eye = DVec3::new(0.5, 0.4, 0.7).normalize() * distance;
     let make = |i: u64| {
@@ -105,7 +105,7 @@ fn far_sphere(radius: f64, distance: f64, sphere_moves: bool) -> (Scene, DVec3) 
 /// α off the axis the normal leans by asin(d/r · sin α) − α.
 fn disc_error(radius: f64, distance: f64, sphere_moves: bool, edge: u32) -> f64 {
     let (scene, eye) = far_sphere(radius, distance, sphere_moves);
-    let embree = EmbreeIntersector::new(&scene, HitRules::default(), None, 1).unwrap();
+    let embree = EmbreeIntersector::new(&scene, HitRules::default(), suite::isa(), 1).unwrap();
     let to_light = DVec3::new(0.3, 0.5, 0.8).normalize();
     let rim = (1.0 / distance).asin();
     let mut most = 0f64;
@@ -146,7 +146,7 @@ pub fn far_sphere_silhouette(size: Size) -> Outcome {
     for power in 1..=7 {
         let distance = 10f64.powi(power);
         let (scene, eye) = far_sphere(1.0, distance, false);
-        let embree = EmbreeIntersector::new(&scene, HitRules::default(), None, 1).unwrap();
+        let embree = EmbreeIntersector::new(&scene, HitRules::default(), suite::isa(), 1).unwrap();
         let scale = scene.recentring.scale();
         let sphere = &scene.spheres[0];
         let (centre, radius) = (sphere.centre, sphere.radius);

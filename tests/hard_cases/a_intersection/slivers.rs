@@ -83,7 +83,7 @@ fn trace<T: Send + Default>(
     for seed in 0..fields {
         let field = Field::new(seed);
         let scene = field.world.clone().into_scene(way.rules.recentre).unwrap();
-        let embree = EmbreeIntersector::new(&scene, way.rules, None, 1).unwrap();
+        let embree = EmbreeIntersector::new(&scene, way.rules, suite::isa(), 1).unwrap();
         let single = OneByOne(&embree);
         let tracer: &dyn Intersector = if way.one_by_one { &single } else { &embree };
         let batch = |rays: &[Ray], hits: &[Option<Hit>]| {

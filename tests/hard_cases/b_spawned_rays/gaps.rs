@@ -79,7 +79,7 @@ fn all_seen(
     rays: u64,
     through: impl Fn(&SurfaceInteraction, DVec3) -> Ray,
 ) -> bool {
-    let embree = EmbreeIntersector::new(scene, HitRules::default(), None, 1).unwrap();
+    let embree = EmbreeIntersector::new(scene, HitRules::default(), suite::isa(), 1).unwrap();
     let x = scene.meshes[0].corners(0)[0].length() / 1.5f64.sqrt();
     (0..rays).all(|i| {
         let mut rng = suite::rng(28, i);
@@ -109,7 +109,7 @@ fn concentric(gap: f64, facets: bool, rays: u64) -> Outcome {
         }
     }
     let scene = world.into_scene(true).unwrap();
-    let embree = EmbreeIntersector::new(&scene, HitRules::default(), None, 1).unwrap();
+    let embree = EmbreeIntersector::new(&scene, HitRules::default(), suite::isa(), 1).unwrap();
     let scale = scene.recentring.scale();
     let mut outcome = Outcome::default();
     for i in 0..rays {

@@ -96,7 +96,7 @@ fn pair(i: u64, rays: u64) -> Tally {
     // too small to be told from a point beside the other.
     let recentred = if i % 2 == 0 { world.clone().into_scene(true).ok() } else { None };
     let scene = recentred.unwrap_or_else(|| world.into_scene(false).unwrap());
-    let embree = EmbreeIntersector::new(&scene, HitRules::default(), None, 1).unwrap();
+    let embree = EmbreeIntersector::new(&scene, HitRules::default(), suite::isa(), 1).unwrap();
     let mut rng = suite::rng(27, i);
     let plane_error = PlaneError::of(&scene.meshes[1].corners(0));
     let (mut spawned, mut sent) = (Vec::new(), Vec::new());
@@ -156,7 +156,7 @@ pub fn offset_far(size: Size) -> Outcome {
     for offset in [0.0, 100.0, 1e4, 1e6] {
         let mesh = || shapes::sphere(DVec3::splat(offset), 2.0, 200, 100);
         let ours = shapes::scene_of(mesh());
-        let embree = EmbreeIntersector::new(&ours, HitRules::default(), None, 4).unwrap();
+        let embree = EmbreeIntersector::new(&ours, HitRules::default(), suite::isa(), 4).unwrap();
         let oracle = Oracle::new(&ours);
         let hits = spawned_hits(&ours, &embree, rays, |si, dir| si.spawn(dir, true));
         // A sphere of rounded corners is not quite convex: what the oracle sees too is there.
@@ -173,7 +173,7 @@ pub fn offset_far(size: Size) -> Outcome {
             spawn_offset: false,
             recentre: false,
         };
-        let stock = EmbreeIntersector::new(&raw, off, None, 4).unwrap();
+        let stock = EmbreeIntersector::new(&raw, off, suite::isa(), 4).unwrap();
         let naive = spawned_hits(&raw, &stock, rays, |si, dir| {
             let p = (si.p + si.ng * 1e-4).as_vec3().as_dvec3();
             Ray::new(p, dir)

@@ -133,7 +133,7 @@ fn lit(
     rays: u64,
     start: impl Fn(&Scene, &Hit, &SurfaceInteraction, DVec3) -> SpawnPoint + Sync,
 ) -> (u64, u64) {
-    let embree = EmbreeIntersector::new(scene, HitRules::default(), None, 4).unwrap();
+    let embree = EmbreeIntersector::new(scene, HitRules::default(), suite::isa(), 4).unwrap();
     let mesh = &scene.meshes[0];
     let radius = scene.bounds.extent().length();
     let batch = |batch: u64| {
