@@ -130,48 +130,48 @@ fn spread(values: &[f64], digits: usize) -> String {
 /// Camera rays of a choice that knows how much every pixel's samples differ.
 ///
 /// Some runs tell the error level of each pixel, others what a choice by these levels takes for the error of uniform
-/// samples. On the runs that it knows, any choice would seem to take fewer, since it would follow their chance too.
+/// samples. On the runs that it knows any choice would seem to take fewer, since it would follow their chance too.
 fn fewest(choice: &Choice) {
     const COUNTS: [u32; 8] = [2, 4, 8, 16, 32, 64, 128, 256];
     const TRUTH: u32 = 2048;
+    /// Numbers of samples that tell levels, each with so many samples in all runs.
+    const KNOWN: [u32; 3] = [4, 16, 64];
+    const OF_EACH: u32 = 512;
+    /// Runs that a choice is measured on.
     const RUNS: u64 = 4;
     /// Powers by which errors may fall with the number of samples: 1 for independent ones; more for strata, as at
     /// edges.
     const POWERS: [f64; 3] = [1.0, 1.25, 1.5];
     println!(
-        "camera rays of a choice that knows how much every pixel's samples differ, per cent of those of"
+        "camera rays of a choice that knows how much every pixel's samples differ, per cent of"
     );
-    println!(
-        "uniform samples, the least of {} choices by levels of {RUNS} runs, on as many other runs",
-        POWERS.len()
-    );
+    println!("those of uniform samples");
     let mut rows = Vec::new();
     for scene in SCENES.into_iter().filter(|scene| choice.takes(scene)) {
         let set = Set::load(scene, |_| ());
         let judged = Judged::new(&set, choice, TRUTH);
         let truth = codes(&judged.base, &judged.truth);
-        // Mean squared error of each pixel, for each number of samples.
-        let errors = |first: u64| {
-            COUNTS.map(|spp| {
-                let mut sums = vec![0.0; truth.len()];
-                for seed in first..first + RUNS {
-                    let shown =
-                        codes(&judged.base, &judged.traced(&uniform(&judged.base, spp, seed)));
-                    for (sum, pair) in sums.iter_mut().zip(shown.iter().zip(&truth)) {
-                        *sum += mean_square(&[*pair.0], &[*pair.1]) / RUNS as f64;
-                    }
+        // Mean squared error of each pixel.
+        let errors = |spp: u32, seeds: std::ops::Range<u64>| {
+            let runs = seeds.end - seeds.start;
+            let mut sums = vec![0.0; truth.len()];
+            for seed in seeds {
+                let shown = codes(&judged.base, &judged.traced(&uniform(&judged.base, spp, seed)));
+                for (sum, pair) in sums.iter_mut().zip(shown.iter().zip(&truth)) {
+                    *sum += mean_square(&[*pair.0], &[*pair.1]) / runs as f64;
                 }
-                sums
-            })
+            }
+            sums
         };
-        let (known, measured) = (errors(1), errors(1 + RUNS));
+        let known = KNOWN.map(|spp| errors(spp, 1001..1001 + u64::from(OF_EACH / spp)));
+        let measured = COUNTS.map(|spp| errors(spp, 1..1 + RUNS));
         let mut row = vec![scene.to_string()];
         for (target, least) in [(16, 2), (16, 4), (64, 4), (64, 8)] {
             let share = |power: f64| {
                 // The error of a single sample that each number of samples suggests; their mean.
                 let level = |i: usize| {
                     let of = |(n, errors): (&u32, &Vec<f64>)| errors[i] * f64::from(*n).powf(power);
-                    COUNTS.iter().zip(&known).map(of).sum::<f64>() / COUNTS.len() as f64
+                    KNOWN.iter().zip(&known).map(of).sum::<f64>() / KNOWN.len() as f64
                 };
                 let levels: Vec<f64> = (0..truth.len()).map(level).collect();
                 fewest_share(&COUNTS, (&levels, power), &measured, (target, least))
