@@ -101,13 +101,16 @@ impl<'a> Probe<'a> {
         notes
     }
 
-    /// The share of the recorded points that have an estimate of a light.
+    /// The share of the recorded points that have an estimate of a light, of those that a light may reach.
     pub fn known_share(&self) -> f64 {
         let notes = self.notes.lock().unwrap_or_else(PoisonError::into_inner);
+        let is_lit = |light: &&LightComparison| light.unshadowed != 0.0;
+        let lit = notes.iter().filter(|note| note.lights.iter().any(|light| is_lit(&light)));
         let is_known = |note: &&Note| {
-            note.lights.iter().any(|l| l.unshadowed != 0.0 && !l.estimate.ratio.is_nan())
+            note.lights.iter().filter(is_lit).any(|light| !light.estimate.ratio.is_nan())
         };
-        notes.iter().filter(is_known).count() as f64 / notes.len().max(1) as f64
+        let known = lit.clone().filter(is_known).count();
+        known as f64 / lit.count().max(1) as f64
     }
 
     /// The findings by pixel (column, row). `self` recorded estimates and traces, `other` a second trace of the same

@@ -110,12 +110,13 @@ impl SurfaceReuse<'_> {
             let (rendered, probe) = trace(&mask, STREAMS[0], Some(lookup), Sampling::Own)?;
             Result::Ok((draw, mask, rendered, probe))
         };
+        let could_be = |probe: &Probe| could_be_worth_lookups(probe.known_share(), cast);
         let mut trial = RayCounts::default();
         let (draw, mask, first, own) = match (is_hopeless, known) {
             (true, _) => estimated(HOPELESS)?,
             (false, 0) => {
                 let few = estimated(1.0)?;
-                if could_be_worth_lookups(few.3.known_share(), cast) {
+                if could_be(&few.3) {
                     trial = few.2.rays;
                     estimated(FIRST[0])?
                 } else {
@@ -131,6 +132,7 @@ impl SurfaceReuse<'_> {
         let samples = |[x, y]: [u32; 2]| {
             counts.get(first.film.index(x, y)).copied().unwrap_or(r.settings.spp)
         };
+        let could_be = could_be(&own);
         let found = own.findings(again, r.settings.spp, &samples);
         let of_others = |part: usize| {
             let is_in = move |pixel: &[u32; 2]| draw.part(pixel[0], pixel[1]) == part;
@@ -142,7 +144,7 @@ impl SurfaceReuse<'_> {
         let findings: Vec<Finding> = found.iter().flat_map(|(_, f)| f).copied().collect();
         let evidence = Evidence::of(before().chain(&findings), tolerance);
         // The frame's own probes are traced in any case, so they cost nothing more.
-        let is_worth_lookups = is_worth_lookups(&evidence, findings.iter(), cast, 0.0);
+        let is_worth_lookups = could_be && is_worth_lookups(&evidence, findings.iter(), cast, 0.0);
         let probed = Arc::new(Probed {
             draw,
             mask,

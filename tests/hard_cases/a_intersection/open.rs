@@ -53,8 +53,14 @@ pub fn open_meshes(size: Size) -> Outcome {
         lost += passed;
     }
     outcome.at_most("share past an open mesh's vertices, worst", most, OPEN_VERTEX_LIMIT);
-    // Where sixty triangles meet hardly a ray is lost.
-    outcome.at_least("meshes on which verify sees that a second try is missing", seen.into(), 6.0);
+    // Where sixty triangles meet hardly a ray is lost; without fused multiply-add Embree loses few anywhere.
+    let is_fused = !matches!(suite::isa(), Some("sse4.2" | "avx"));
+    let least = if is_fused { 6.0 } else { 1.0 };
+    outcome.at_least(
+        "meshes on which verify sees that a second try is missing",
+        seen.into(),
+        least,
+    );
     outcome.at_least("rays past an open mesh's vertices", lost as f64, 1.0);
     outcome
 }
