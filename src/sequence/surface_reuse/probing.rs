@@ -26,9 +26,11 @@ use std::sync::Arc;
 /// Added to a frame's number (at most a million) to seed the light samples of the probes' two traces, and of
 /// the audit's. The first, which is shown, has the samples of a traced frame.
 const STREAMS: [u32; 3] = [0, 1 << 31, 3 << 30];
-/// Multiple of the usual share of pixels that is probed, if no, one, or more reference frames have probes. Where none has,
-/// the usual share comes first: if it finds hardly an estimate, as where frames do not overlap, no more are probed.
-const FIRST: [f64; 3] = [4.0, 2.0, 1.0];
+/// Multiple of the usual share of pixels that is probed, if no, one, or more reference frames have probes.
+const MULTIPLES: [f64; 3] = [1.0, 2.0, 1.0];
+/// The multiple where no reference frame has probes, once the usual share has found estimates enough: where frames do not
+/// overlap there are none.
+const FIRST: f64 = 4.0;
 /// Frames of fewer pixels get as many probes as a frame of this many pixels.
 const LEAST: f64 = 25_000.0;
 /// Multiple of the usual share if the findings of other frames say that lookups do not pay.
@@ -111,20 +113,14 @@ impl SurfaceReuse<'_> {
             Result::Ok((draw, mask, rendered, probe))
         };
         let could_be = |probe: &Probe| could_be_worth_lookups(probe.known_share(), cast);
+        let usually = MULTIPLES[known.min(MULTIPLES.len() - 1)];
+        let multiple = if is_hopeless { HOPELESS } else { usually };
+        let (mut draw, mut mask, mut first, mut own) = estimated(multiple)?;
         let mut trial = RayCounts::default();
-        let (draw, mask, first, own) = match (is_hopeless, known) {
-            (true, _) => estimated(HOPELESS)?,
-            (false, 0) => {
-                let few = estimated(1.0)?;
-                if could_be(&few.3) {
-                    trial = few.2.rays;
-                    estimated(FIRST[0])?
-                } else {
-                    few
-                }
-            }
-            (false, _) => estimated(FIRST[known.min(FIRST.len() - 1)])?,
-        };
+        if known == 0 && could_be(&own) {
+            trial = first.rays;
+            (draw, mask, first, own) = estimated(FIRST)?;
+        }
         let counts = first.sample_counts();
         let (mut second, again) = trace(&mask, STREAMS[1], None, sampling_of(&counts))?;
         // Only the first is gone on with.
