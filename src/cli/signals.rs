@@ -170,7 +170,10 @@ impl Interrupt {
             return;
         }
         let _ = self.reason.set(reason);
-        self.stop.store(true, Ordering::SeqCst);
+        if self.stop.swap(true, Ordering::SeqCst) {
+            // The first request is being followed already.
+            return;
+        }
         if !self.watched.load(Ordering::SeqCst) {
             if self.is_root.load(Ordering::SeqCst) {
                 self.exit();
@@ -195,7 +198,8 @@ impl Interrupt {
             if self.is_orphan() {
                 signal_hook::low_level::exit(Exit::Orphaned.code().into());
             }
-            std::process::exit(Exit::Stopped.code().into());
+            // Without what runs at exit: the main thread may be freeing the same things.
+            signal_hook::low_level::exit(Exit::Stopped.code().into());
         }
     }
 }
