@@ -12,6 +12,7 @@ use super::probe::{SettingsProbe, reference, samples_of_reference};
 use super::worst::worst;
 use crate::error::Result;
 use crate::scene::Settings;
+use std::time::Instant;
 
 /// Share of the squared error in reach that bounces and cut-off may leave out.
 const BIAS: f64 = 0.1;
@@ -25,6 +26,10 @@ const TRIALS: u32 = 8;
 const STEP: f64 = 4.0;
 /// Between squared errors less than this factor apart nothing is tried.
 const CLOSE: f64 = 1.2;
+/// Share of the job's time that the probe may take.
+const SHARE: f64 = 0.2;
+/// Seconds that it may take however short the job is.
+const LEAST_SECONDS: f64 = 12.0;
 
 /// What a setting was measured to come to.
 #[derive(Debug, Clone, Copy)]
@@ -46,6 +51,10 @@ struct Search<'a> {
     measured: Vec<Measured>,
     /// What was found so far.
     predictor: Predictor,
+    /// When the probe began.
+    begun: Instant,
+    /// Seconds that the patches took, and their samples.
+    spent: (f64, f64),
 }
 
 impl SettingsProbe<'_> {
@@ -56,9 +65,10 @@ impl SettingsProbe<'_> {
     /// # Errors
     /// [`crate::error::Error::Stopped`]; errors of rendering.
     pub fn look(&self, aim: f64, progress: &dyn Fn(&str)) -> Result<(Predictor, Vec<Prediction>)> {
+        let begun = Instant::now();
         let effort = self.effort()?;
         progress("errors of a short sweep");
-        let mut search = Search::begin(self, effort)?;
+        let mut search = Search::begin(self, effort, begun)?;
         progress("times");
         search.predictor.modes = self.modes(search.predictor.bounces, effort.small)?;
         let mut found = Vec::new();
@@ -75,13 +85,15 @@ impl SettingsProbe<'_> {
 
 impl<'a> Search<'a> {
     /// Traces the sweep, fits the model to it, and chooses the bounces.
-    fn begin(probe: &'a SettingsProbe<'a>, effort: Effort) -> Result<Self> {
+    fn begin(probe: &'a SettingsProbe<'a>, effort: Effort, begun: Instant) -> Result<Self> {
         let (context, patches) = (probe.context, probe.patches(effort)?);
         let reference = samples_of_reference(SampleCounts { spp: 8, shadow: 2, sky: 2 });
+        let (traced, mut rays) = (Instant::now(), rays_of(reference));
         let truth = patches.trace(context, &converged(context.base, reference))?;
         let (mut points, mut doubts) = (Vec::new(), Vec::new());
         for samples in design(probe) {
             let seen = patches.trace(context, &sampled(context.base, samples))?;
+            rays += rays_of(samples);
             let (errors, doubt) = squared_errors(&patches, &truth, &seen);
             points.push(SampleErrors { samples, reference, errors });
             doubts = doubt;
@@ -99,7 +111,10 @@ impl<'a> Search<'a> {
             Some(goal @ Goal::Psnr(_)) => goal.largest(),
             _ => IN_REACH * points.iter().map(|p| largest(&p.errors)).fold(f64::INFINITY, f64::min),
         };
-        let mut search = Self { probe, patches, truth, reference, measured: Vec::new(), predictor };
+        let spent = (traced.elapsed().as_secs_f64(), rays);
+        let measured = Vec::new();
+        let mut search =
+            Self { probe, patches, truth, reference, measured, predictor, begun, spent };
         let (bounces, bias) = search.bounces(BIAS * in_reach)?;
         (search.predictor.bounces, search.predictor.bias) = (bounces, bias);
         Ok(search)
@@ -133,6 +148,11 @@ impl<'a> Search<'a> {
         for _ in 0..TRIALS {
             let guess = aim.and_then(|aim| self.predictor.fastest(mode, &range, aim));
             let (Some(guess), Some(tried)) = (guess, aim) else { break };
+            if !self.has_time_for(&guess) {
+                // What is predicted is better than nothing.
+                best = best.or(Some(guess));
+                break;
+            }
             let Measured { squared_error, figure, .. } = self.measure(goal, guess.samples)?;
             let ratio = figure / allowed;
             // Other figures rise about as the root of the squared error.
@@ -146,22 +166,46 @@ impl<'a> Search<'a> {
         Ok(best)
     }
 
+    /// Whether it can be measured what `guess` comes to before the probe has taken its share of the job's time.
+    fn has_time_for(&self, guess: &Prediction) -> bool {
+        let Prediction { samples, reuse, seconds, .. } = *guess;
+        let is_known = self.measured.iter().any(|known| known.samples == samples);
+        let (spent, rays) = self.spent;
+        let own = rays_of(samples);
+        let reference = match self.is_coarse_for(samples) {
+            true => rays_of(samples_of_reference(samples)),
+            false => 0.0,
+        };
+        let trial = (own + reference) * spent / rays;
+        let job = seconds * self.probe.frames_each(reuse);
+        is_known || may_take(self.begun.elapsed().as_secs_f64() + trial, job)
+    }
+
+    /// Whether the reference has too few samples to measure what `samples` come to.
+    fn is_coarse_for(&self, samples: SampleCounts) -> bool {
+        self.reference.spp < 2 * samples.spp
+            || self.reference.shadow < samples.shadow
+            || self.reference.sky < samples.sky
+    }
+
     /// What `samples` come to at the patches, with the bounces chosen; nothing is traced twice.
     fn measure(&mut self, goal: Goal, samples: SampleCounts) -> Result<Measured> {
         if let Some(known) = self.measured.iter().find(|known| known.samples == samples) {
             return Ok(*known);
         }
         let context = self.probe.context;
-        let is_coarse = self.reference.spp < 2 * samples.spp
-            || self.reference.shadow < samples.shadow
-            || self.reference.sky < samples.sky;
-        if is_coarse {
+        let traced = Instant::now();
+        let mut rays = rays_of(samples);
+        if self.is_coarse_for(samples) {
             self.reference = samples_of_reference(samples);
             self.truth = self.patches.trace(context, &converged(context.base, self.reference))?;
+            rays += rays_of(self.reference);
         }
         let (bounces, cutoff) = (self.predictor.bounces, context.base.cutoff);
         let settings = Settings { bounces, cutoff, ..sampled(context.base, samples) };
         let seen = self.patches.trace(context, &settings)?;
+        self.spent.0 += traced.elapsed().as_secs_f64();
+        self.spent.1 += rays;
         let (mut errors, doubts) = squared_errors(&self.patches, &self.truth, &seen);
         let own = self.predictor.model.own_part(samples, self.reference);
         errors.iter_mut().for_each(|error| *error *= own);
@@ -239,6 +283,16 @@ impl Bracket {
     }
 }
 
+/// Whether a probe may take `seconds`, if the job takes `job`.
+fn may_take(seconds: f64, job: f64) -> bool {
+    seconds <= (SHARE * job).max(LEAST_SECONDS)
+}
+
+/// Rays of a pixel of so many samples, one light and sky each.
+fn rays_of(SampleCounts { spp, shadow, sky }: SampleCounts) -> f64 {
+    f64::from(spp) * f64::from(1 + shadow + sky)
+}
+
 fn largest(errors: &[f64]) -> f64 {
     errors.iter().copied().fold(0.0, f64::max)
 }
@@ -274,7 +328,7 @@ fn sampled(base: &Settings, samples: SampleCounts) -> Settings {
 
 #[cfg(test)]
 mod tests {
-    use super::Bracket;
+    use super::{Bracket, may_take};
 
     /// The squared errors tried where the goal is reached up to `limit`, and the figure rises by `power`.
     fn tried(start: f64, limit: f64, power: f64) -> Vec<f64> {
@@ -298,6 +352,12 @@ mod tests {
                 assert!(all.iter().all(|x| *x >= start.min(0.2)), "{power} {start}: {all:?}");
             }
         }
+    }
+
+    #[test]
+    fn a_probe_takes_a_fifth_of_a_job_of_a_minute_or_more() {
+        assert!(may_take(12.0, 0.1) && !may_take(12.1, 60.0));
+        assert!(may_take(120.0, 600.0) && !may_take(121.0, 600.0));
     }
 
     #[test]
