@@ -100,11 +100,17 @@ const SHARED: f32 = 1.5;
 const BESIDE_RISK: u32 = 2;
 
 /// Number of check rays to a light for an answer that saves `rays` shadow rays to it. The check is of all lights of a
-/// point together that are inferred: this one sends the part `share` of what arrives of these without shadows. The point's
-/// other lights may be traced (`in_part`).
-pub fn check_rays(rays: u32, share: f32, in_part: bool) -> u32 {
+/// point together that are inferred: this one sends the part `share` of what arrives of these without shadows, and the
+/// answer is `ratio`, NaN where it has none. The point's other lights may be traced (`in_part`).
+///
+/// In half shadow there are twice as many: the mean of four rays then has a standard deviation of a quarter, so that not
+/// even a point that sees all of the light, or nothing, would be two of them away.
+pub fn check_rays(rays: u32, share: f32, ratio: f32, in_part: bool) -> u32 {
     let all = (rays / RAYS_PER_CHECK).max(FEWEST_CHECKS);
-    let all = all.saturating_mul(if in_part { BESIDE_RISK } else { 1 }).min(rays);
+    let all = all.saturating_mul(if in_part { BESIDE_RISK } else { 1 });
+    // A tail's ratio may be above 1.
+    let variance = (ratio * (1.0 - ratio)).max(0.0);
+    let all = ((all as f32 * (1.0 + 4.0 * variance)).round() as u32).min(rays);
     ((SHARED * share * all as f32).ceil() as u32).clamp(all.min(1), all)
 }
 
@@ -394,15 +400,18 @@ mod tests {
     #[test]
     fn lights_share_check_rays_and_hide_little_more_than_one_with_the_fewest() {
         assert_eq!(
-            [0, 1, 3, 16, 64, 100].map(|rays| check_rays(rays, 1.0, false)),
+            [0, 1, 3, 16, 64, 100].map(|rays| check_rays(rays, 1.0, 1.0, false)),
             [0, 1, 3, 4, 4, 6]
         );
-        assert_eq!([0.9, 0.1].map(|share| check_rays(16, share, false)), [4, 1]);
-        let of = |rays, share| check_rays(rays, share, false);
+        assert_eq!([0.9, 0.1].map(|share| check_rays(16, share, 1.0, false)), [4, 1]);
+        let of = |rays, share| check_rays(rays, share, 1.0, false);
         assert_eq!([of(160, 0.5), of(160, 0.0), of(0, 0.5)], [8, 1, 0]);
         // Twice as many where other lights are traced.
-        assert_eq!([1.0, 0.1].map(|share| check_rays(64, share, true)), [8, 2]);
-        assert_eq!(check_rays(6, 1.0, true), 6);
+        assert_eq!([1.0, 0.1].map(|share| check_rays(64, share, 1.0, true)), [8, 2]);
+        assert_eq!(check_rays(6, 1.0, 1.0, true), 6);
+        // Also of what no frame knows, as for probes.
+        let of = |ratio| check_rays(64, 1.0, ratio, false);
+        assert_eq!([0.0, f32::NAN, 0.1, 0.5, 0.9, 1.2].map(of), [4, 4, 5, 8, 5, 4]);
         let one = hidden(FEWEST_CHECKS);
         for (rays, lights) in [16, 100, 1024].into_iter().flat_map(|r| (2..30).map(move |n| (r, n)))
         {
@@ -411,7 +420,7 @@ mod tests {
                 let all: f64 = (0..lights).map(sent).sum();
                 let of = |k: i32| {
                     let share = sent(k) / all;
-                    share * share * hidden(check_rays(rays, share as f32, false))
+                    share * share * hidden(check_rays(rays, share as f32, 1.0, false))
                 };
                 let together: f64 = (0..lights).map(of).sum();
                 // A fifth more at worst, for a few lights of some kinds.

@@ -19,13 +19,17 @@ const MATTER: Option<Change> = Some(Specimen::with_matter);
 const FOG: Option<Change> = Some(Specimen::with_fog);
 
 /// Families, each with the camera samples of its pixels.
-const SCENES: [(&str, usize, Option<Change>); 13] = [
+const SCENES: [(&str, usize, Option<Change>); 17] = [
     ("forest", 1, None),
     ("grating", 4, None),
     ("contact", 4, None),
     ("foliage", 1, None),
     ("mirrors", 1, None),
     ("cornell", 4, None),
+    ("city", 4, None),
+    ("blinds", 1, None),
+    ("lamps", 1, None),
+    ("tiny-lamp", 4, None),
     ("forest", 4, LENS),
     ("contact", 1, LENS),
     ("mirrors", 4, LENS),

@@ -390,11 +390,13 @@ impl Groups {
         let samples = self.asked.points[point].samples;
         let saved = samples.saturating_mul(rays);
         let shown = &self.asked.unshadowed[point * channels..][..channels];
-        let sent: f32 = shown[own].iter().sum();
+        let (first, sent) = (own.start, shown[own].iter().sum::<f32>());
         let in_part = shown.iter().zip(checks).any(|(shown, check)| *shown != 0.0 && !check);
         let inferred = shown.iter().zip(checks).filter(|(_, check)| **check);
         let share = sent / inferred.map(|(shown, _)| shown).sum::<f32>();
-        let all = check_rays(saved, share, in_part);
+        // The parts of a light have much the same.
+        let ratio = self.asked.estimates[point * channels..][first].ratio;
+        let all = check_rays(saved, share, ratio, in_part);
         let until =
             |before: u32| (u64::from(before) * u64::from(all) / u64::from(samples)) as usize;
         // A run of a net's points is spread evenly where it starts at a multiple of a power of two.
