@@ -409,7 +409,7 @@ mod tests {
         // Twice as many where other lights are traced.
         assert_eq!([1.0, 0.1].map(|share| check_rays(64, share, 1.0, true)), [8, 2]);
         assert_eq!(check_rays(6, 1.0, 1.0, true), 6);
-        // Also of what no frame knows, as for probes.
+        // More in half shadow.
         let of = |ratio| check_rays(64, 1.0, ratio, false);
         assert_eq!([0.0, f32::NAN, 0.1, 0.5, 0.9, 1.2].map(of), [4, 4, 5, 8, 5, 4]);
         let one = hidden(FEWEST_CHECKS);

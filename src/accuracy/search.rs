@@ -53,14 +53,17 @@ struct Search<'a> {
     predictor: Predictor,
     /// When the probe began.
     begun: Instant,
-    /// Seconds that the patches took, and their samples.
+    /// Seconds that the patches took, and the rays of a pixel.
     spent: (f64, f64),
+    /// A setting that is predicted to reach the goal, which there was no time to measure.
+    unmeasured: Option<Prediction>,
 }
 
 impl SettingsProbe<'_> {
     /// Measures the scene. Where there is a goal, it also gives, for each reuse policy, the fastest setting
     /// found whose figure was measured to be at most `aim` times the largest that the goal allows, or the
-    /// largest itself where there is no such setting. `progress` is called with what is being done.
+    /// largest itself where there is no such setting. Where the job is too short to measure any, it gives one that is
+    /// predicted to reach the goal. `progress` is called with what is being done.
     ///
     /// # Errors
     /// [`crate::error::Error::Stopped`]; errors of rendering.
@@ -77,6 +80,9 @@ impl SettingsProbe<'_> {
             found = search.fastest(goal, aim * goal.largest())?;
             if found.is_empty() {
                 found = search.fastest(goal, goal.largest())?;
+            }
+            if found.is_empty() {
+                found.extend(search.unmeasured);
             }
         }
         Ok((search.predictor, found))
@@ -112,9 +118,17 @@ impl<'a> Search<'a> {
             _ => IN_REACH * points.iter().map(|p| largest(&p.errors)).fold(f64::INFINITY, f64::min),
         };
         let spent = (traced.elapsed().as_secs_f64(), rays);
-        let measured = Vec::new();
-        let mut search =
-            Self { probe, patches, truth, reference, measured, predictor, begun, spent };
+        let mut search = Self {
+            probe,
+            patches,
+            truth,
+            reference,
+            measured: Vec::new(),
+            predictor,
+            begun,
+            spent,
+            unmeasured: None,
+        };
         let (bounces, bias) = search.bounces(BIAS * in_reach)?;
         (search.predictor.bounces, search.predictor.bias) = (bounces, bias);
         Ok(search)
@@ -149,8 +163,7 @@ impl<'a> Search<'a> {
             let guess = aim.and_then(|aim| self.predictor.fastest(mode, &range, aim));
             let (Some(guess), Some(tried)) = (guess, aim) else { break };
             if !self.has_time_for(&guess) {
-                // What is predicted is better than nothing.
-                best = best.or(Some(guess));
+                self.unmeasured.get_or_insert(guess);
                 break;
             }
             let Measured { squared_error, figure, .. } = self.measure(goal, guess.samples)?;
