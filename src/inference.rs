@@ -104,7 +104,7 @@ const BESIDE_RISK: u32 = 2;
 /// answer is `ratio`, NaN where it has none. The point's other lights may be traced (`in_part`).
 ///
 /// In half shadow there are twice as many: the mean of four rays then has a standard deviation of a quarter, so that not
-/// even a point that sees all of the light, or nothing, would be two of them away.
+/// even a point that sees all of the light, or nothing, would be more than two of them away.
 pub fn check_rays(rays: u32, share: f32, ratio: f32, in_part: bool) -> u32 {
     let all = (rays / RAYS_PER_CHECK).max(FEWEST_CHECKS);
     let all = all.saturating_mul(if in_part { BESIDE_RISK } else { 1 });

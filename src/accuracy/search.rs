@@ -182,16 +182,21 @@ impl<'a> Search<'a> {
     /// Whether it can be measured what `guess` comes to before the probe has taken its share of the job's time.
     fn has_time_for(&self, guess: &Prediction) -> bool {
         let Prediction { samples, reuse, seconds, .. } = *guess;
-        let is_known = self.measured.iter().any(|known| known.samples == samples);
         let (spent, rays) = self.spent;
-        let own = rays_of(samples);
-        let reference = match self.is_coarse_for(samples) {
-            true => rays_of(samples_of_reference(samples)),
-            false => 0.0,
-        };
-        let trial = (own + reference) * spent / rays;
+        let trial = self.rays_to_measure(samples) * spent / rays;
         let job = seconds * self.probe.frames_each(reuse);
-        is_known || may_take(self.begun.elapsed().as_secs_f64() + trial, job)
+        self.known(samples).is_some() || may_take(self.begun.elapsed().as_secs_f64() + trial, job)
+    }
+
+    /// What `samples` were measured to come to.
+    fn known(&self, samples: SampleCounts) -> Option<Measured> {
+        self.measured.iter().copied().find(|known| known.samples == samples)
+    }
+
+    /// Rays of a pixel that measuring `samples` takes, with those of a finer reference where it is needed.
+    fn rays_to_measure(&self, samples: SampleCounts) -> f64 {
+        let finer = self.is_coarse_for(samples).then(|| samples_of_reference(samples));
+        rays_of(samples) + finer.map_or(0.0, rays_of)
     }
 
     /// Whether the reference has too few samples to measure what `samples` come to.
@@ -203,16 +208,14 @@ impl<'a> Search<'a> {
 
     /// What `samples` come to at the patches, with the bounces chosen; nothing is traced twice.
     fn measure(&mut self, goal: Goal, samples: SampleCounts) -> Result<Measured> {
-        if let Some(known) = self.measured.iter().find(|known| known.samples == samples) {
-            return Ok(*known);
+        if let Some(known) = self.known(samples) {
+            return Ok(known);
         }
         let context = self.probe.context;
-        let traced = Instant::now();
-        let mut rays = rays_of(samples);
+        let (traced, rays) = (Instant::now(), self.rays_to_measure(samples));
         if self.is_coarse_for(samples) {
             self.reference = samples_of_reference(samples);
             self.truth = self.patches.trace(context, &converged(context.base, self.reference))?;
-            rays += rays_of(self.reference);
         }
         let (bounces, cutoff) = (self.predictor.bounces, context.base.cutoff);
         let settings = Settings { bounces, cutoff, ..sampled(context.base, samples) };
