@@ -7,7 +7,6 @@
 use crate::film::Provenance;
 use crate::math::{DVec3, Vec3};
 use crate::scene::{LightCells, Scene, ratio_count};
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// Camera samples of a pixel that are traced, shaded and looked up together: 256 rays of a whole block are enough
@@ -189,8 +188,7 @@ impl TracedPoints {
             return self;
         }
         let channels = self.ratios.len() / self.points.len();
-        let mut order: Vec<u32> = (0..self.points.len() as u32).collect();
-        order.par_sort_by_key(|i| place(&self.points[*i as usize]));
+        let order = in_order(&self.points);
         let points = order.iter().map(|i| self.points[*i as usize]).collect();
         let own = |i: &u32| *i as usize * channels..(*i as usize + 1) * channels;
         let ratios = order.iter().flat_map(|i| &self.ratios[own(i)]).copied().collect();
@@ -198,6 +196,26 @@ impl TracedPoints {
         let lights = order.iter().flat_map(lights).copied().collect();
         Self { points, ratios, lights }
     }
+}
+
+/// The numbers of `points` row by row. There are about as many points as pixels, so they are counted, not compared.
+fn in_order(points: &[TracedPoint]) -> Vec<u32> {
+    let width = points.iter().map(|t| t.x as usize + 1).max().unwrap_or(0);
+    let rows = points.iter().map(|t| t.y as usize + 1).max().unwrap_or(0);
+    let pixel = |t: &TracedPoint| t.y as usize * width + t.x as usize;
+    let mut places = vec![0_u32; width * rows];
+    points.iter().for_each(|t| places[pixel(t)] += 1);
+    let mut before = 0;
+    for place in &mut places {
+        before += std::mem::replace(place, before);
+    }
+    let mut order = vec![0; points.len()];
+    for (i, t) in (0..).zip(points) {
+        let place = &mut places[pixel(t)];
+        order[*place as usize] = i;
+        *place += 1;
+    }
+    order
 }
 
 /// Number of no light, of a channel that is free.

@@ -46,13 +46,16 @@ impl ProbeDraw {
         mix(self.seed ^ mix(u64::from(self.frame) ^ mix(self.group(x, y))))
     }
 
-    /// Whether the pixel is a probe.
-    pub fn has(&self, x: u32, y: u32) -> bool {
+    /// The probed block of the cell that contains a pixel: its column and row among the cell's blocks.
+    fn probed_block(&self, x: u32, y: u32) -> [u32; 2] {
         let word = self.words(x, y);
         let cell = u64::from(self.cell);
-        let at = [word % cell, (word >> 32) % cell];
-        let own = [x, y].map(|p| u64::from(p / self.block % self.cell));
-        own == at
+        [word % cell, (word >> 32) % cell].map(|at| at as u32)
+    }
+
+    /// Whether the pixel is a probe.
+    pub fn has(&self, x: u32, y: u32) -> bool {
+        [x, y].map(|p| p / self.block % self.cell) == self.probed_block(x, y)
     }
 
     /// The part of the probes, below [`PARTS`], that a probe belongs to.
@@ -62,7 +65,20 @@ impl ProbeDraw {
 
     /// For each pixel of an image, row by row, whether it is a probe.
     pub fn mask(&self, width: u32, height: u32) -> Vec<bool> {
-        (0..height).flat_map(|y| (0..width).map(move |x| self.has(x, y))).collect()
+        let mut mask = vec![false; width as usize * height as usize];
+        let edge = (self.cell * self.block) as usize;
+        // Once for each cell, not for each pixel.
+        for top in (0..height).step_by(edge) {
+            for left in (0..width).step_by(edge) {
+                let [right, down] = self.probed_block(left, top).map(|at| at * self.block);
+                for y in (top + down)..(top + down + self.block).min(height) {
+                    for x in (left + right)..(left + right + self.block).min(width) {
+                        mask[y as usize * width as usize + x as usize] = true;
+                    }
+                }
+            }
+        }
+        mask
     }
 }
 

@@ -1,8 +1,10 @@
 //! How ratios change from pixel to pixel of a frame. Each pass over a row compares all its pixels
-//! with the pixels at one fixed offset, so that the compiler can use vector instructions.
+//! with the pixels at one fixed offset, so that the compiler can use vector instructions: products and sums are not fused, so
+//! every processor finds the same.
 
 use super::{Contrast, NONE};
 use crate::inference::{NO_LIGHT, SAME_SURFACE, SurfacePoint};
+use pulp::Arch;
 use rayon::prelude::*;
 
 /// Largest distance, in pixels, of the neighbours that a pixel is compared with.
@@ -89,7 +91,7 @@ pub(super) fn contrasts(
     (width, channels): (usize, usize),
 ) -> Vec<Contrast> {
     let mut contrasts = vec![Contrast::UNKNOWN; ratios.len()];
-    if slots.is_empty() {
+    if points.is_empty() {
         return contrasts;
     }
     let own = |i: usize| (slots[i] != NONE).then_some(slots[i] as usize);
@@ -182,10 +184,13 @@ impl Buffers {
         }
         let rows = bend.par_chunks_mut(columns).zip(wide.par_chunks_mut(columns));
         let rows = rows.zip(part.rows(same, width)).enumerate();
-        rows.for_each(|(y, ((bend, wide), same))| near_row(known, y, same, bend, wide));
+        let lanes = Arch::new();
+        rows.for_each(|(y, ((bend, wide), same))| {
+            lanes.dispatch(|| near_row(known, y, same, bend, wide));
+        });
         let known = Image::of(wide.len(), columns, f32::NAN, |i| Some(wide[i]));
         let rows = far.par_chunks_mut(columns).zip(part.rows(same, width)).enumerate();
-        rows.for_each(|(y, (far, same))| far_row(&known, y, same, far));
+        rows.for_each(|(y, (far, same))| lanes.dispatch(|| far_row(&known, y, same, far)));
     }
 
     fn at(&self, i: usize) -> Contrast {
@@ -205,22 +210,30 @@ fn same_surface(
     let normal = [0, 1, 2]
         .map(|axis| Image::of(pixels, width, 0.0, |i| own(i).map(|own| points[own].n[axis])));
     let mut same = vec![0; pixels];
+    let lanes = Arch::new();
     same.par_chunks_mut(width).enumerate().for_each(|(y, same)| {
-        let [nx, ny, nz] = [&normal[0], &normal[1], &normal[2]].map(|n| n.own(y));
-        let own = mesh.own(y);
-        for (k, place) in AROUND.into_iter().enumerate() {
-            let [ox, oy, oz] = [&normal[0], &normal[1], &normal[2]].map(|n| n.row(y, place));
-            let other = mesh.row(y, place);
-            for (x, same) in same.iter_mut().enumerate() {
-                let cos = nx[x] * ox[x] + ny[x] * oy[x] + nz[x] * oz[x];
-                *same |= u32::from((own[x] == other[x]) & (cos > SAME_SURFACE)) << k;
-            }
-        }
+        lanes.dispatch(|| same_row(&mesh, &normal, y, same));
     });
     same
 }
 
+/// The neighbours that show the same surface as the pixels of row `y`, by their meshes and normals.
+#[inline(always)] // Into what is compiled for the processor's lanes.
+fn same_row(mesh: &Image<u32>, normal: &[Image<f32>; 3], y: usize, same: &mut [u32]) {
+    let [nx, ny, nz] = [&normal[0], &normal[1], &normal[2]].map(|n| n.own(y));
+    let own = mesh.own(y);
+    for (k, place) in AROUND.into_iter().enumerate() {
+        let [ox, oy, oz] = [&normal[0], &normal[1], &normal[2]].map(|n| n.row(y, place));
+        let other = mesh.row(y, place);
+        for (x, same) in same.iter_mut().enumerate() {
+            let cos = nx[x] * ox[x] + ny[x] * oy[x] + nz[x] * oz[x];
+            *same |= u32::from((own[x] == other[x]) & (cos > SAME_SURFACE)) << k;
+        }
+    }
+}
+
 /// Bend and contrast of the pixels of row `y` of the `known` ratios; NaN where too few are known.
+#[inline(always)]
 fn near_row(known: &Image<f32>, y: usize, same: &[u32], bend: &mut [f32], wide: &mut [f32]) {
     let own = known.own(y);
     bend.fill(f32::NEG_INFINITY);
@@ -252,6 +265,7 @@ fn near_row(known: &Image<f32>, y: usize, same: &[u32], bend: &mut [f32], wide: 
 }
 
 /// For each pixel of row `y` the largest known contrast among itself and its neighbours.
+#[inline(always)]
 fn far_row(wide: &Image<f32>, y: usize, same: &[u32], far: &mut [f32]) {
     far.copy_from_slice(wide.own(y));
     for (k, place) in AROUND.into_iter().enumerate() {
