@@ -81,8 +81,16 @@ fn joined(parts: &[WorldMesh], material: u32) -> WorldMesh {
     common::mesh(positions, triangles, material)
 }
 
-/// Indices of pixels of `film` much further from `truth` than any trace is in the pixels around.
-fn bad_pixels(settings: &Settings, film: &Film, truth: &Film, traces: &[Film]) -> Vec<usize> {
+/// A pixel that is much further from the truth than traces are around it.
+struct BadPixel {
+    index: usize,
+    /// How far it is off, and how far it may be, of 1.
+    off: f64,
+    most: f64,
+}
+
+/// The pixels of `film` much further from `truth` than any trace is in the pixels around.
+fn bad_pixels(settings: &Settings, film: &Film, truth: &Film, traces: &[Film]) -> Vec<BadPixel> {
     let truth_codes = moves::codes(settings, truth);
     let off = |film: &Film| -> Vec<f64> {
         let pairs = moves::codes(settings, film).into_iter().zip(&truth_codes);
@@ -98,22 +106,31 @@ fn bad_pixels(settings: &Settings, film: &Film, truth: &Film, traces: &[Film]) -
         near.map(|j| scatter.iter().map(|s| s[j]).fold(0.0, f64::max)).fold(0.0, f64::max)
     };
     let own = off(film);
-    (0..own.len()).filter(|i| own[*i] > ALWAYS + SCATTER * around(*i)).collect()
+    let judged =
+        |index| BadPixel { index, off: own[index], most: ALWAYS + SCATTER * around(index) };
+    (0..own.len()).map(judged).filter(|pixel| pixel.off > pixel.most).collect()
 }
 
-/// What is bad in each of `films` of a frame, and in one more trace of it.
+/// What is bad in each of `films` of a frame, and in one more trace of it, by each of two sets of traces. By one set alone
+/// a pixel of 150,000 of one more trace is bad as well; what another frame had there is bad by any.
 fn judge(
     stage: &Stage,
     settings: &Settings,
     shot: &Shot,
     frame: u32,
     films: &[&Film],
-) -> (Vec<Vec<usize>>, usize) {
+) -> (Vec<Vec<BadPixel>>, usize) {
     let truth = stage.converged(settings, shot, frame, 1024);
     let trace = |k: u32| stage.traced(settings, shot, frame, k * STREAM + frame);
-    let traces: Vec<Film> = (1..=TRACES).map(trace).collect();
-    let bad = |film: &Film| bad_pixels(settings, film, &truth, &traces);
-    (films.iter().map(|film| bad(film)).collect(), bad(&trace(TRACES + 1)).len())
+    let set = |first: u32| -> Vec<Film> { (first..first + TRACES).map(trace).collect() };
+    let (one, other) = (set(1), set(1 + TRACES));
+    let bad = |film: &Film| {
+        let by_other = bad_pixels(settings, film, &truth, &other);
+        let is_both = |pixel: &BadPixel| by_other.iter().any(|p| p.index == pixel.index);
+        let by_one = bad_pixels(settings, film, &truth, &one);
+        by_one.into_iter().filter(is_both).collect::<Vec<_>>()
+    };
+    (films.iter().map(|film| bad(film)).collect(), bad(&trace(1 + 2 * TRACES)).len())
 }
 
 fn in_one_segment(settings: Settings) -> Settings {
@@ -163,10 +180,14 @@ pub fn behind_pickets(size: Size, lamp: f64, change: impl FnOnce(&mut Set)) -> O
         let films = [&made.film, &other.film];
         let (bad, traced) = judge(&stage, &settings, &set.shot, *frame, &films);
         outcome.count(u64::from(width * height), bad[0].len() as u64);
-        for i in &bad[0] {
-            let (x, y) = (*i as u32 % width, *i as u32 / width);
-            let source = made.film.provenance.as_ref().unwrap()[*i];
-            outcome.example(format!("lamp {lamp:.2}, frame {frame}, pixel {x},{y}: {source:?}"));
+        for BadPixel { index, off, most } in &bad[0] {
+            let (x, y) = (*index as u32 % width, *index as u32 / width);
+            let source = made.film.provenance.as_ref().unwrap()[*index];
+            outcome.example(format!(
+                "lamp {lamp:.2}, frame {frame}, pixel {x},{y}: off by {:.1} of 255, at most {:.1}; {source:?}",
+                255.0 * off,
+                255.0 * most
+            ));
         }
         (control, stale) = (control + traced, stale + bad[1].len());
         (inferred, points) = (inferred + made.reuse.direct_inferred, points + made.reuse.direct);
