@@ -54,7 +54,8 @@ impl ProbeDraw {
     }
 
     /// Whether the pixel is a probe.
-    pub fn has(&self, x: u32, y: u32) -> bool {
+    #[cfg(test)]
+    fn has(&self, x: u32, y: u32) -> bool {
         [x, y].map(|p| p / self.block % self.cell) == self.probed_block(x, y)
     }
 
@@ -236,5 +237,25 @@ impl Inference for Probe<'_> {
         };
         let notes = points.iter().enumerate().map(note);
         self.notes.lock().unwrap_or_else(PoisonError::into_inner).extend(notes);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mask_has_the_probe_of_each_cell() {
+        for ([width, height], share, block) in
+            [([1, 1], 0.01, 1), ([7, 5], 0.25, 2), ([161, 97], 0.016, 1), ([161, 97], 0.01, 2)]
+        {
+            let draw = ProbeDraw::of(3, 9, share, block);
+            let mask = draw.mask(width, height);
+            let places = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
+            assert!(places.zip(&mask).all(|((x, y), own)| draw.has(x, y) == *own));
+            let found = mask.iter().filter(|own| **own).count() as f64;
+            let wanted = f64::from(width * height) * share;
+            assert!(found <= 1.5 * wanted + f64::from(4 * block * block), "{found} for {wanted}");
+        }
     }
 }

@@ -19,7 +19,7 @@ use crate::reuse::store::{Compatibility, ReferenceRecord};
 use crate::reuse::{self, Judged, Lookup, LookupChannel, Reference};
 use crate::scene::{Camera, Rect};
 use crate::shade::{FrameJob, Progress, Rendered, Reuse};
-use probing::Probing;
+use probing::Probed;
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
@@ -51,7 +51,7 @@ struct State {
     /// The last representative of which a copy is still to be returned.
     again: Option<(u32, Made)>,
     /// The frame whose probes were rendered last.
-    probing: Option<(u32, Probing)>,
+    probed: Option<(u32, Arc<Probed>)>,
 }
 
 impl<'a> SurfaceReuse<'a> {
@@ -89,10 +89,10 @@ impl<'a> SurfaceReuse<'a> {
             Some(rendered) => rendered,
             None => self.rendered(frame, is_due, None, self.context.progress)?,
         };
-        let probing = self.probes(frame, &camera, &references)?;
+        let probed = self.probes(frame, &camera, &references)?;
         let mut audit = None;
         let mut findings = &[][..];
-        if let Some(Probing::Probed(probed)) = &probing {
+        if let Some(probed) = &probed {
             audit = self.add_probes(frame, &camera, &references, probed, &mut rendered)?;
             findings = &probed.findings;
         }
@@ -121,14 +121,7 @@ impl<'a> SurfaceReuse<'a> {
     ) -> Result<Rendered> {
         let references = self.references(&self.schedule.ancestors(frame))?;
         let camera = self.context.camera(frame)?;
-        let probed = match self.probes(frame, &camera, &references)? {
-            Some(Probing::GivenUp) => {
-                let job = FrameJob { mask, ..self.context.job(frame, &camera) };
-                return self.render_with(job, None, false, progress);
-            }
-            Some(Probing::Probed(probed)) => Some(probed),
-            None => None,
-        };
+        let probed = self.probes(frame, &camera, &references)?;
         let known = probed.as_ref().map(|probed| probed.shown());
         let job = FrameJob { mask, known, beyond_crop: is_due, ..self.context.job(frame, &camera) };
         let Some(probed) = probed.as_ref().filter(|probed| probed.is_worth_lookups) else {
@@ -143,18 +136,18 @@ impl<'a> SurfaceReuse<'a> {
         })
     }
 
-    /// What probes decide for a representative; `None` where nothing can be inferred.
+    /// The probes of a representative; `None` where nothing can be inferred.
     fn probes(
         &self,
         frame: u32,
         camera: &Camera,
         references: &[Arc<Reference>],
-    ) -> Result<Option<Probing>> {
+    ) -> Result<Option<Arc<Probed>>> {
         if self.context.renderer.settings.reuse.probes == 0.0 {
             return Ok(None);
         }
         self.with_lookup((frame, camera), references, |lookup| {
-            lookup.map(|lookup| self.probing(frame, camera, &lookup)).transpose()
+            lookup.map(|lookup| self.probe(frame, camera, &lookup)).transpose()
         })
     }
 
@@ -184,16 +177,6 @@ impl<'a> SurfaceReuse<'a> {
         progress: &dyn Progress,
     ) -> Result<Rendered> {
         let is_source = job.beyond_crop || self.terms.is_some();
-        self.render_with(job, inference, is_source, progress)
-    }
-
-    fn render_with(
-        &self,
-        job: FrameJob,
-        inference: Option<&dyn Inference>,
-        is_source: bool,
-        progress: &dyn Progress,
-    ) -> Result<Rendered> {
         let reuse = Reuse { channels: &self.channels, inference, is_source };
         let reuse = (!self.channels.is_empty()).then_some(reuse);
         self.context.render(&FrameJob { reuse, ..job }, progress)

@@ -380,12 +380,7 @@ impl Renderer<'_> {
     ) {
         scratch.starts.clear();
         scratch.starts.resize(lit.len(), None);
-        let only_counts = input.only_counts();
-        let reuse = input.reuse.as_ref().filter(|_| !only_counts);
-        if only_counts {
-            scratch.groups.count_points(input, lit);
-        }
-        if let Some(reuse) = reuse {
+        if let Some(reuse) = &input.reuse {
             scratch.channels = reuse.channels.len();
             scratch.colours = reuse.channels.colours();
             scratch.groups.gather_points(input, reuse.channels, lit);
@@ -400,7 +395,7 @@ impl Renderer<'_> {
             users.find(selection, &input.lights, points, |c| selection.of_diffuse(c), slot);
             self.look_at_tails(selection, (lit, &users.cells), scratch);
         }
-        if let Some(reuse) = reuse {
+        if let Some(reuse) = &input.reuse {
             self.light_without_shadows(input, lit, &users, scratch);
             if let Some(selection) = &input.selection {
                 let points = (lit, &users.cells[..]);
@@ -496,12 +491,6 @@ impl Renderer<'_> {
             };
             Gathered { exact, ..Gathered::default() }
         }));
-        if source.is_kept && s.groups.only_counts() {
-            let is_lit = |(_, gathered): &(_, &Gathered)| gathered.exact != 0.0;
-            for (user, _) in wanted.iter().zip(&s.gathered).filter(is_lit) {
-                s.groups.note_lit(user.point as usize);
-            }
-        }
         if let Some(fog) = self.fog().filter(|_| !source.is_sky()) {
             let unknown =
                 wanted.iter().zip(&mut s.gathered).filter(|(user, _)| user.slot.is_none());
@@ -707,8 +696,8 @@ impl Renderer<'_> {
     ) -> Vec<LightUser> {
         let mut wanted = std::mem::take(&mut s.wanted);
         wanted.clear();
-        if !source.is_kept || s.groups.only_counts() {
-            wanted.extend(reached.iter().map(|user| LightUser { slot: None, ..user }));
+        if !source.is_kept {
+            wanted.extend(reached.iter());
             return wanted;
         }
         let channels = s.channels;

@@ -152,8 +152,6 @@ pub(super) struct Groups {
     forbidden: Vec<bool>,
     /// Surface points that a camera ray out of focus ends at; empty where the lens blurs nothing.
     blurred: Vec<bool>,
-    /// Whether all that is wanted of surface points is how many of them are lit.
-    only_counts: bool,
     order: Vec<(u64, u32)>,
     /// Channels of a surface point.
     channels: usize,
@@ -212,23 +210,9 @@ impl Groups {
         }
     }
 
-    /// Groups `lit` into surface points, of which nobody knows anything and none is kept.
-    pub fn count_points(&mut self, input: &FrameInput, lit: &[ShadingPoint]) {
-        self.join_points(input, lit);
-        self.only_counts = true;
-        self.lit.clear();
-        self.lit.resize(self.asked.points.len(), false);
-    }
-
-    /// Whether all that is wanted of surface points is how many of them are lit.
-    pub fn only_counts(&self) -> bool {
-        self.only_counts
-    }
-
     /// Groups `lit` into surface points. Where lights are selected, none has a channel at first.
     pub fn gather_points(&mut self, input: &FrameInput, channels: &Channels, lit: &[ShadingPoint]) {
         self.join_points(input, lit);
-        self.only_counts = false;
         let (count, lights) = (self.asked.points.len(), &mut self.asked.lights);
         lights.clear();
         if channels.slots() > 0 {
@@ -508,10 +492,6 @@ impl Groups {
                 false => (&mut counts.specular, &mut counts.specular_inferred),
             };
             *lit += 1;
-            if self.only_counts {
-                pixels.join_provenance(self.pixels[i], None);
-                continue;
-            }
             *inferred += u64::from(!self.traced[i]);
             let inferred = (!self.traced[i]).then_some(&self.asked.provenance[i]);
             pixels.join_provenance(self.pixels[i], inferred);
@@ -536,7 +516,7 @@ impl Groups {
                 sources.lights.extend(lights.iter().take(channels));
             }
         }
-        if let Some(inference) = reuse.inference.filter(|_| !self.only_counts) {
+        if let Some(inference) = reuse.inference {
             inference.hear(&self.asked);
         }
     }

@@ -259,14 +259,6 @@ impl FrameInput<'_> {
         self.pixel_size / f64::from(count).sqrt()
     }
 
-    /// Whether reuse wants no more than the number of surface points: nobody knows any of them, and none is kept.
-    fn only_counts(&self) -> bool {
-        let is_idle = |reuse: &Reuse| reuse.inference.is_none() && !reuse.is_source;
-        // Lights that are selected, and environments, find their channels by the surface point.
-        let is_simple = self.selection.is_none() && self.environment.is_none();
-        is_simple && self.reuse.as_ref().is_some_and(is_idle)
-    }
-
     /// The points, of so many, that source number `at` is traced at.
     fn reached<'u>(&self, at: usize, points: usize, users: &'u LightUsers) -> Reached<'u> {
         let source = &self.lights[at];

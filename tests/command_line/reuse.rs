@@ -319,38 +319,3 @@ fn inferred_frames_that_are_less_accurate_than_traced_ones_are_named() {
     assert_eq!(strict.code, Some(1), "{}", strict.err);
     assert!(strict.err.contains("error: inferred frames"), "{}", strict.err);
 }
-
-/// With as few rays to the sky as a lookup is worth at best, probes show that it does not pay.
-#[test]
-fn frames_in_which_nothing_is_to_be_gained_cast_the_rays_of_policy_off() {
-    let job = Job::new();
-    let text = "[camera]\nframes = 17\n\
-        pan = { from = [-1, 1.5, 7], to = [1, 1.5, 7], target = [0, 0, 0] }\n\
-        [settings]\nsize = [48, 27]\nspp = 1\nvideo = false\nsky_samples = 32\n[sky]\nradiance = 0.3\n\
-        [reuse]\nsegment = 16\n[[mesh]]\nfile = 'cube.obj'\n\
-        [[mesh]]\nquad = { centre = [0, -1, 0], normal = 'y', size = [20, 20] }\n";
-    fs::write(job.path("scene.toml"), text).expect("written");
-    let rays = |folder: &str, options: &str| -> Vec<Value> {
-        let line = format!("render scene.toml --stats {folder}.json {options} -o {folder}/f_#.png");
-        job.done(&line);
-        let stats: Value =
-            serde_json::from_slice(&job.read(&format!("{folder}.json"))).expect("JSON");
-        let mut frames = stats["frames"].as_array().expect("frames").clone();
-        frames.sort_by_key(|frame| frame["frame"].as_u64());
-        frames.iter().map(|frame| frame["rays"].clone()).collect()
-    };
-    let (own, off) = (rays("all", ""), rays("off", "--policy off"));
-    let more: Vec<usize> = (1..=17).filter(|frame| own[frame - 1] != off[frame - 1]).collect();
-    // The middle and the quarters have probes: two frames of them are enough to give up the others.
-    assert_eq!(more, [5, 9, 13]);
-    assert!(frames(&job, "all", 1..=17) == frames(&job, "off", 1..=17));
-    // A reference of such a frame is as empty on disk.
-    let options = "--aovs reference -o part/f_#.exr";
-    job.done(&format!("render scene.toml --frames 6..7 {options}"));
-    job.done(&format!("render scene.toml {options}"));
-    job.done("render scene.toml --aovs reference -o whole/f_#.exr");
-    for frame in 1..=17 {
-        let of = |folder| job.read(&format!("{folder}/f_{frame}.exr"));
-        assert!(of("part") == of("whole"), "frame {frame}");
-    }
-}

@@ -37,21 +37,6 @@ const LEAST: f64 = 25_000.0;
 const HOPELESS: f64 = 0.25;
 /// Largest share that is probed.
 const MOST: f64 = 0.25;
-/// How many reference frames must have probes before a frame is given up without any of its own.
-const SHOWN: usize = 2;
-/// How many times the probes of the reference frames are counted then: with more probes the evidence is less cautious, so
-/// that their number does not decide.
-const COUNTED: f64 = 8.0;
-
-/// What probes decide for a frame.
-#[derive(Clone)]
-pub(super) enum Probing {
-    /// Those of its references show that nothing is to be gained: it is traced whole, without probes, and is no source of
-    /// other frames, which see the same of its references.
-    GivenUp,
-    /// It has probes of its own.
-    Probed(Arc<Probed>),
-}
 
 /// A frame's probes.
 pub(super) struct Probed {
@@ -91,34 +76,16 @@ fn sampling_of(counts: &[u32]) -> Sampling<'_> {
 }
 
 impl SurfaceReuse<'_> {
-    /// Whether the probes of a frame's references show that lookups would not pay in it. They would not if the frames
-    /// were closer, either: that makes more estimates, but none less wrong.
-    fn shows_no_gain(&self, lookup: &Lookup) -> bool {
-        let r = &self.context.renderer;
-        let findings = || lookup.references.iter().flat_map(|r| r.findings());
-        if lookup.references.iter().filter(|r| !r.findings().is_empty()).count() < SHOWN {
-            return false;
+    /// Renders the probes of `frame`, seen by `camera`; `lookup` gives their estimates.
+    pub(super) fn probe(
+        &self,
+        frame: u32,
+        camera: &Camera,
+        lookup: &Lookup,
+    ) -> Result<Arc<Probed>> {
+        if let Some((_, probed)) = self.with_state(|s| s.probed.clone()).filter(|p| p.0 == frame) {
+            return Ok(probed);
         }
-        let evidence = Evidence::counted(findings(), COUNTED, r.settings.reuse.tolerance);
-        !is_worth_lookups(&evidence, findings(), (r.scene, &self.channels, r.settings), 0.0)
-    }
-
-    /// Renders the probes of `frame`, seen by `camera`, unless it is given up; `lookup` gives their estimates.
-    pub(super) fn probing(&self, frame: u32, camera: &Camera, lookup: &Lookup) -> Result<Probing> {
-        let known = self.with_state(|s| s.probing.clone()).filter(|known| known.0 == frame);
-        if let Some((_, probing)) = known {
-            return Ok(probing);
-        }
-        let probing = match self.shows_no_gain(lookup) {
-            true => Probing::GivenUp,
-            false => Probing::Probed(Arc::new(self.probe(frame, camera, lookup)?)),
-        };
-        self.with_state(|s| s.probing = Some((frame, probing.clone())));
-        Ok(probing)
-    }
-
-    /// Renders the probes of `frame`.
-    fn probe(&self, frame: u32, camera: &Camera, lookup: &Lookup) -> Result<Probed> {
         let r = &self.context.renderer;
         let tolerance = r.settings.reuse.tolerance;
         let cast = (r.scene, &self.channels, r.settings);
@@ -174,7 +141,7 @@ impl SurfaceReuse<'_> {
         let evidence = Evidence::of(before().chain(&findings), tolerance);
         // The frame's own probes are traced in any case, so they cost nothing more.
         let is_worth_lookups = could_be && is_worth_lookups(&evidence, findings.iter(), cast, 0.0);
-        Ok(Probed {
+        let probed = Arc::new(Probed {
             draw,
             mask,
             traces: [first, second],
@@ -184,7 +151,9 @@ impl SurfaceReuse<'_> {
             evidence,
             crossed,
             is_worth_lookups,
-        })
+        });
+        self.with_state(|s| s.probed = Some((frame, Arc::clone(&probed))));
+        Ok(probed)
     }
 
     /// The job that traces the pixels of `mask`, also outside the crop, without records.
