@@ -83,7 +83,7 @@ pub(super) struct Known4 {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Contrast {
     /// Largest difference between the ratio and the mean of two samples on opposite sides: 0 where the ratio
-    /// changes linearly. At least `wide` if opposite sides are not known in two directions at right angles.
+    /// changes linearly.
     pub bend: f32,
     /// Largest difference between the ratio and those of the 5 x 5 pixels around it.
     pub wide: f32,

@@ -17,10 +17,6 @@ const ALL: usize = 24;
 /// either end of their group.
 const AROUND: [[usize; 2]; ALL] = around();
 
-/// Directions at right angles to one another: along rows and columns, and both diagonals. A bit for each of the first
-/// four of [`AROUND`].
-const CROSSES: [u32; 2] = [0b1010, 0b0101];
-
 /// Columns and rows from the upper left neighbour, at [0, 0], to each neighbour.
 const fn around() -> [[usize; 2]; ALL] {
     let mut places = [[0; 2]; ALL];
@@ -241,17 +237,14 @@ fn same_row(mesh: &Image<u32>, normal: &[Image<f32>; 3], y: usize, same: &mut [u
 fn near_row(known: &Image<f32>, y: usize, same: &[u32], bend: &mut [f32], wide: &mut [f32]) {
     let own = known.own(y);
     bend.fill(f32::NEG_INFINITY);
-    // The directions in which both sides are known, a bit each.
-    let mut ways = vec![0_u32; own.len()];
     for (k, place) in AROUND.into_iter().enumerate().take(NEAR / 2) {
         let opposite = NEAR - 1 - k;
         let (a, b) = (known.row(y, place), known.row(y, AROUND[opposite]));
         let both = 1 << k | 1 << opposite;
-        for (x, (bend, ways)) in bend.iter_mut().zip(&mut ways).enumerate() {
+        for (x, bend) in bend.iter_mut().enumerate() {
             let off = 0.5 * (a[x] + b[x] - 2.0 * own[x]).abs();
-            let is_known = (same[x] & both == both) & (off >= 0.0);
-            *ways |= u32::from(is_known) << k;
-            *bend = if is_known & (off > *bend) { off } else { *bend };
+            let is_more = (same[x] & both == both) & (off > *bend);
+            *bend = if is_more { off } else { *bend };
         }
     }
     let mut count = vec![0; own.len()];
@@ -265,16 +258,9 @@ fn near_row(known: &Image<f32>, y: usize, same: &[u32], bend: &mut [f32], wide: 
             *wide = if is_known & (apart > *wide) { apart } else { *wide };
         }
     }
-    for (((bend, wide), count), ways) in bend.iter_mut().zip(wide).zip(count).zip(ways) {
+    for ((bend, wide), count) in bend.iter_mut().zip(wide).zip(count) {
+        *bend = if *bend >= 0.0 { *bend } else { f32::NAN };
         *wide = if 2 * count >= ALL as u32 { *wide } else { f32::NAN };
-        // Along a stripe of shadow nothing bends: that tells nothing of what is across.
-        let is_crossed = CROSSES.iter().any(|cross| ways & cross == *cross);
-        *bend = match (*bend >= 0.0, is_crossed) {
-            (false, _) => f32::NAN,
-            (true, true) => *bend,
-            // No less than it was where too few are known.
-            (true, false) => bend.max(*wide),
-        };
     }
 }
 
@@ -344,17 +330,6 @@ mod tests {
         assert_eq!(found[MIDDLE + 1].bend, 0.5);
         assert_eq!(found[MIDDLE + 2], Contrast { bend: 0.0, wide: 1.0, far: 1.0 });
         assert_eq!((found[MIDDLE - 4].wide, found[MIDDLE - 4].far), (0.0, 1.0));
-    }
-
-    /// Stripes between pickets: beside a picket no pair of opposite neighbours lies across them.
-    #[test]
-    fn what_bends_only_along_a_stripe_is_as_far_off_as_its_neighbours() {
-        let stripes = |x: usize, _| [0.0, 0.5, 1.0][x % 3];
-        let found = of(stripes, |x, _| x % 3 == 0);
-        let own = found[MIDDLE];
-        assert_eq!((own.bend, own.wide), (0.5, 0.5));
-        // All of its own surface.
-        assert_eq!(of(|_, _| 0.5, |x, _| x % 3 == 0)[MIDDLE].bend, 0.0);
     }
 
     #[test]
