@@ -132,6 +132,13 @@ pub struct Verdict {
     pub pictures: Vec<Pictures>,
 }
 
+/// How many times faster than tracing, by CPU seconds of the jobs that infer and that trace.
+pub fn speed(jobs: &[Spent; 2]) -> f64 {
+    // It is told in hundredths of a second.
+    let [surface, off] = jobs.each_ref().map(|job| job.cpu + 0.005);
+    off / surface
+}
+
 impl Verdict {
     /// Judges the pictures of a move of `last` frames.
     pub fn new(pictures: Vec<Pictures>, last: usize, jobs: [Spent; 2]) -> Self {
@@ -160,9 +167,7 @@ impl Verdict {
 
     /// How many times faster than tracing, by CPU seconds of whole jobs.
     pub fn speed(&self) -> f64 {
-        // It is told in hundredths of a second.
-        let [surface, off] = self.jobs.each_ref().map(|job| job.cpu + 0.005);
-        off / surface
+        speed(&self.jobs)
     }
 
     /// Flicker of inferred frames over that of traced ones; 1 where neither has any to be seen.

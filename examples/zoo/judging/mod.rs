@@ -32,6 +32,7 @@ pub use measure::{FrameFigures, Pictures, Verdict};
 
 use crate::making::{Settings, Subject};
 use job::Render;
+use measure::speed;
 use std::collections::BTreeSet;
 use std::path::Path;
 
@@ -40,10 +41,10 @@ pub type Failure = Box<dyn std::error::Error>;
 
 /// Light samples of each half of the truth over those of a traced frame.
 const TRUER: usize = 8;
-/// How often a move is timed, inferred and traced in turn; the turn of median speed counts.
-const TURNS: usize = 3;
 /// Camera samples of each half of the truth over the most of a pixel, where these are a range.
 const TRUER_CAMERA: usize = 4;
+/// How often a move is timed, inferred and traced in turn; the turn of median speed counts.
+const TURNS: usize = 3;
 
 /// How scenes are rendered.
 #[derive(Clone, Copy)]
@@ -121,29 +122,24 @@ pub fn judge(
     }
     let mut jobs = [inferred, traced];
     if plan.timed {
-        let timed = |name: &str, policy| -> Result<[f64; 2], Failure> {
+        let timed = |name: &str, policy| -> Result<Spent, Failure> {
             let job = run(Render::of_move(name, policy).into_png())?;
             job.remove_frames()?;
-            Ok([job.wall, job.cpu])
+            Ok(job)
         };
         let mut turns = Vec::new();
         for _ in 0..TURNS {
             turns.push([timed("timed-inferred", "surface")?, timed("timed-traced", "off")?]);
         }
         turns.sort_by(|a, b| speed(a).total_cmp(&speed(b)));
-        for (job, own) in jobs.iter_mut().zip(turns[TURNS / 2]) {
-            [job.wall, job.cpu] = own;
+        for (job, timed) in jobs.iter_mut().zip(turns.swap_remove(TURNS / 2)) {
+            (job.wall, job.cpu) = (timed.wall, timed.cpu);
         }
     }
     let verdict = Verdict::new(pictures, frames, jobs);
     // The audit's truth has the frame's own camera samples, so it knows nothing of their error.
     let audit = verdict.audit.filter(|_| settings.most.is_none());
     Ok(Verdict { equal_rays, audit, ..verdict })
-}
-
-/// CPU seconds traced over those inferred, of a turn of both: wall-clock and CPU seconds inferred, then traced.
-fn speed([[_, inferred], [_, traced]]: &[[f64; 2]; 2]) -> f64 {
-    traced / inferred
 }
 
 /// Numbers of the frames that are judged: all of a short move; of a long one in-between frames in

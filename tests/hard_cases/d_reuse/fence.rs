@@ -111,8 +111,7 @@ fn bad_pixels(settings: &Settings, film: &Film, truth: &Film, traces: &[Film]) -
     (0..own.len()).map(judged).filter(|pixel| pixel.off > pixel.most).collect()
 }
 
-/// What is bad in each of `films` of a frame, and in one more trace of it, by each of two sets of traces. By one set alone
-/// a pixel of 150,000 of one more trace is bad as well; what another frame had there is bad by any.
+/// What is bad in each of `films` of a frame, and in one more trace of it.
 fn judge(
     stage: &Stage,
     settings: &Settings,
@@ -122,15 +121,9 @@ fn judge(
 ) -> (Vec<Vec<BadPixel>>, usize) {
     let truth = stage.converged(settings, shot, frame, 1024);
     let trace = |k: u32| stage.traced(settings, shot, frame, k * STREAM + frame);
-    let set = |first: u32| -> Vec<Film> { (first..first + TRACES).map(trace).collect() };
-    let (one, other) = (set(1), set(1 + TRACES));
-    let bad = |film: &Film| {
-        let by_other = bad_pixels(settings, film, &truth, &other);
-        let is_both = |pixel: &BadPixel| by_other.iter().any(|p| p.index == pixel.index);
-        let by_one = bad_pixels(settings, film, &truth, &one);
-        by_one.into_iter().filter(is_both).collect::<Vec<_>>()
-    };
-    (films.iter().map(|film| bad(film)).collect(), bad(&trace(1 + 2 * TRACES)).len())
+    let traces: Vec<Film> = (1..=TRACES).map(trace).collect();
+    let bad = |film: &Film| bad_pixels(settings, film, &truth, &traces);
+    (films.iter().map(|film| bad(film)).collect(), bad(&trace(TRACES + 1)).len())
 }
 
 fn in_one_segment(settings: Settings) -> Settings {
