@@ -17,6 +17,26 @@ const ALL: usize = 24;
 /// either end of their group.
 const AROUND: [[usize; 2]; ALL] = around();
 
+/// Directions at right angles to one another: along rows and columns, and both diagonals. A bit for each of the first
+/// four of [`AROUND`].
+const CROSSES: [u32; 2] = [0b1010, 0b0101];
+/// For each of the eight nearest neighbours the one behind it, twice as far away.
+const BEHIND: [usize; NEAR] = behind();
+
+const fn behind() -> [usize; NEAR] {
+    let mut all = [0; NEAR];
+    let mut at = 0;
+    while at < NEAR * ALL {
+        let (k, other) = (at / ALL, at % ALL);
+        let [[x, y], [u, v]] = [AROUND[k], AROUND[other]];
+        if 2 * x == u + REACH && 2 * y == v + REACH {
+            all[k] = other;
+        }
+        at += 1;
+    }
+    all
+}
+
 /// Columns and rows from the upper left neighbour, at [0, 0], to each neighbour.
 const fn around() -> [[usize; 2]; ALL] {
     let mut places = [[0; 2]; ALL];
@@ -198,8 +218,8 @@ impl Buffers {
     }
 }
 
-/// For each pixel a bit for each neighbour of [`AROUND`] that shows the same surface; `own` is the number of the
-/// pixel's point.
+/// For each pixel a bit for each neighbour of [`AROUND`] that shows the same surface, then one for each of the eight
+/// nearest that shows another mesh, or none; `own` is the number of the pixel's point.
 fn same_surface(
     points: &[SurfacePoint],
     pixels: usize,
@@ -228,6 +248,10 @@ fn same_row(mesh: &Image<u32>, normal: &[Image<f32>; 3], y: usize, same: &mut [u
         for (x, same) in same.iter_mut().enumerate() {
             let cos = nx[x] * ox[x] + ny[x] * oy[x] + nz[x] * oz[x];
             *same |= u32::from((own[x] == other[x]) & (cos > SAME_SURFACE)) << k;
+        }
+        if k < NEAR {
+            let lies_beside = |x: usize| u32::from(own[x] != other[x]) << (ALL + k);
+            same.iter_mut().enumerate().for_each(|(x, same)| *same |= lies_beside(x));
         }
     }
 }
@@ -262,6 +286,28 @@ fn near_row(known: &Image<f32>, y: usize, same: &[u32], bend: &mut [f32], wide: 
         *bend = if *bend >= 0.0 { *bend } else { f32::NAN };
         *wide = if 2 * count >= ALL as u32 { *wide } else { f32::NAN };
     }
+    // Along a stripe of shadow nothing bends, which tells nothing of what is across.
+    for (x, bend) in bend.iter_mut().enumerate().filter(|(x, _)| same[*x] >> ALL != 0) {
+        let beside = same[x] >> ALL;
+        let edges = (0..NEAR / 2).map(|k| ((beside >> k | beside >> (NEAR - 1 - k)) & 1) << k);
+        let edges = edges.sum::<u32>();
+        if CROSSES.iter().all(|cross| edges & cross != 0) && !bend.is_nan() {
+            *bend = bend.max(across((known, y), (same[x], edges), x).unwrap_or(0.0));
+        }
+    }
+}
+
+/// The least bend of pixel `x` of row `y` in the directions of `edges`, a bit each, from two neighbours in line on one
+/// side; `None` where no such two are known.
+fn across((known, y): (&Image<f32>, usize), (same, edges): (u32, u32), x: usize) -> Option<f32> {
+    let own = known.own(y)[x];
+    let at = |k: usize| {
+        let ratio = known.row(y, AROUND[k])[x];
+        (same >> k & 1 == 1 && !ratio.is_nan()).then_some(ratio)
+    };
+    let sides = (0..NEAR).filter(|k| edges >> k.min(&(NEAR - 1 - k)) & 1 == 1);
+    let bends = sides.filter_map(|k| Some(0.5 * (own + at(BEHIND[k])? - 2.0 * at(k)?).abs()));
+    bends.reduce(f32::min)
 }
 
 /// For each pixel of row `y` the largest known contrast among itself and its neighbours.
@@ -330,6 +376,20 @@ mod tests {
         assert_eq!(found[MIDDLE + 1].bend, 0.5);
         assert_eq!(found[MIDDLE + 2], Contrast { bend: 0.0, wide: 1.0, far: 1.0 });
         assert_eq!((found[MIDDLE - 4].wide, found[MIDDLE - 4].far), (0.0, 1.0));
+    }
+
+    /// Beside a picket no pair of opposite neighbours lies across the stripes of shadow.
+    #[test]
+    fn what_bends_across_a_stripe_counts_from_one_side() {
+        let bend = |ratio: fn(usize) -> f32| of(|x, _| ratio(x), |x, _| x == 3)[MIDDLE].bend;
+        assert_eq!(bend(|x| 0.125 * x as f32), 0.0);
+        assert_eq!(bend(|x| if x == 5 { 1.0 } else { 0.5 }), 0.5);
+        // Only two pixels lie beside one another.
+        let between = |ratio: fn(usize) -> f32| of(|x, _| ratio(x), |x, _| x % 3 == 0)[MIDDLE].bend;
+        assert_eq!(between(|x| 0.125 * x as f32), 0.0);
+        // Both the row and the column are known.
+        let corner = of(|x, _| if x == 5 { 1.0 } else { 0.5 }, |x, y| x == 3 && y != 4);
+        assert_eq!(corner[MIDDLE].bend, 0.25);
     }
 
     #[test]
