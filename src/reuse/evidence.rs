@@ -43,6 +43,24 @@ pub struct Finding {
     pub noise: f32,
 }
 
+/// What the probes of a frame found.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Findings {
+    /// The findings at the points that other frames know.
+    pub list: Vec<Finding>,
+    /// How many points of camera samples any light may reach whose ratios are kept.
+    pub lit: u64,
+    /// Of how many of these other frames know a light.
+    pub known: u64,
+}
+
+impl Findings {
+    /// The share of the lit points that other frames know.
+    pub fn known_share(&self) -> f64 {
+        self.known as f64 / self.lit.max(1) as f64
+    }
+}
+
 /// Estimate and both traces of one light at a point.
 #[derive(Debug, Clone, Copy)]
 pub struct LightComparison {
@@ -184,14 +202,23 @@ impl Evidence {
     /// The evidence of `findings`. An error of up to `tolerance` display steps (root mean square over a tile) is
     /// allowed whatever tracing's error is.
     pub fn of<'f>(findings: impl Iterator<Item = &'f Finding>, tolerance: f32) -> Self {
+        Self::counted(findings, 1.0, tolerance)
+    }
+
+    /// The evidence if each of `findings` had been made so many `times`.
+    pub fn counted<'f>(
+        findings: impl Iterator<Item = &'f Finding>,
+        times: f64,
+        tolerance: f32,
+    ) -> Self {
         let unseen = UNSEEN_SHARE * f64::from(tolerance) * f64::from(tolerance);
         let mut sums = [Sums::default(); LEVELS];
         // Where check rays do not agree, the point is traced whatever its level.
         for finding in findings.filter(|finding| finding.agreed) {
             let level = usize::from(finding.level);
-            sums[level].count += 1.0;
-            sums[level].error += f64::from(finding.error) / risk_of(level);
-            sums[level].noise += f64::from(finding.noise);
+            sums[level].count += times;
+            sums[level].error += times * f64::from(finding.error) / risk_of(level);
+            sums[level].noise += times * f64::from(finding.noise);
         }
         let mut limits = [0.0; LEVELS];
         for (sums, limits) in sums.chunks_exact(2 * STEPS).zip(limits.chunks_exact_mut(2 * STEPS)) {

@@ -118,8 +118,8 @@ impl<'a> Probe<'a> {
         notes
     }
 
-    /// The share of the recorded points that have an estimate of a light, of those that a light may reach.
-    pub fn known_share(&self) -> f64 {
+    /// How many of the recorded points a light may reach, and how many of these have an estimate of one.
+    pub fn lit_and_known(&self) -> (u64, u64) {
         let notes = self.notes.lock().unwrap_or_else(PoisonError::into_inner);
         let is_lit = |light: &&LightComparison| light.unshadowed != 0.0;
         let lit = notes.iter().filter(|note| note.lights.iter().any(|light| is_lit(&light)));
@@ -127,7 +127,7 @@ impl<'a> Probe<'a> {
             note.lights.iter().filter(is_lit).any(|light| !light.estimate.ratio.is_nan())
         };
         let known = lit.clone().filter(is_known).count();
-        known as f64 / lit.count().max(1) as f64
+        (lit.count() as u64, known as u64)
     }
 
     /// The findings by pixel (column, row). `self` recorded estimates and traces, `other` a second trace of the same

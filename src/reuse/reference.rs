@@ -8,7 +8,7 @@ mod contrast;
 mod gather;
 mod lists;
 
-use super::evidence::Finding;
+use super::evidence::Findings;
 use super::index::Index;
 use crate::inference::{SurfacePoint, TracedPoints};
 use crate::math::{DVec3, Vec3};
@@ -195,7 +195,7 @@ pub struct Reference {
     /// Finds samples that are not in `slots`: points seen in mirrors, through glass or beside another surface.
     pub(super) index: Index,
     /// The findings of the frame's probes.
-    findings: Vec<Finding>,
+    findings: Findings,
 }
 
 impl Reference {
@@ -230,16 +230,26 @@ impl Reference {
         let more = order.iter().flat_map(|i| (1..channels).map(|channel| known(*i, channel)));
         let more = more.collect();
         let lights = LightLists::of(&gathered.lights, &order, channels);
-        Self { frame, view, slots, samples, more, channels, lights, index, findings: Vec::new() }
+        Self {
+            frame,
+            view,
+            slots,
+            samples,
+            more,
+            channels,
+            lights,
+            index,
+            findings: Findings::default(),
+        }
     }
 
     /// This reference with the findings of the frame's probes.
-    pub fn with_findings(self, findings: Vec<Finding>) -> Self {
+    pub fn with_findings(self, findings: Findings) -> Self {
         Self { findings, ..self }
     }
 
     /// The findings of the frame's probes.
-    pub fn findings(&self) -> &[Finding] {
+    pub fn findings(&self) -> &Findings {
         &self.findings
     }
 
@@ -269,7 +279,7 @@ impl Reference {
     /// Memory that the reference takes, bytes.
     pub fn memory(&self) -> u64 {
         let samples = size_of_val(&self.samples[..]) + size_of_val(&self.more[..]);
-        let findings = size_of_val(&self.findings[..]);
+        let findings = size_of_val(&self.findings.list[..]);
         let own = samples + size_of_val(&self.slots[..]) + findings;
         own as u64 + self.lights.memory() + self.index.memory()
     }

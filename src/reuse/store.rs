@@ -11,7 +11,7 @@
 
 use super::Reference;
 use super::columns::{self, deflated, inflated, take, take_u32};
-use super::evidence::Finding;
+use super::evidence::{Finding, Findings};
 use super::risk::LEVELS;
 use crate::error::{Error, Result};
 use crate::inference::{Channel, Channels, SurfacePoint, TracedPoint, TracedPoints, most_ratio};
@@ -23,7 +23,7 @@ use std::path::Path;
 /// Name of the attribute of an exr file that holds the record.
 pub const ATTRIBUTE: &str = "tweenrayReference";
 /// First bytes of a record; the last letter is the layout's version.
-const MAGIC: &[u8; 8] = b"twrayrf5";
+const MAGIC: &[u8; 8] = b"twrayrf6";
 /// Number of 32-bit words of a point, without its ratios and the numbers of their lights.
 const WORDS: usize = 12;
 /// Bytes of a finding.
@@ -68,6 +68,9 @@ struct Head {
     settings: String,
     points: usize,
     findings: usize,
+    /// Of the points that the frame's probes saw: how many were lit, and how many of these were known.
+    lit: u64,
+    known: u64,
 }
 
 impl Compatibility {
@@ -147,7 +150,7 @@ pub struct ReferenceRecord<'a> {
     /// The traced points, scene space.
     pub traced: &'a TracedPoints,
     /// The findings of the frame's probes.
-    pub findings: &'a [Finding],
+    pub findings: &'a Findings,
     /// Settings in words.
     pub settings: &'a str,
 }
@@ -165,13 +168,15 @@ impl ReferenceRecord<'_> {
             frame,
             settings: settings.into(),
             points: order.len(),
-            findings: findings.len(),
+            findings: findings.list.len(),
+            lit: findings.lit,
+            known: findings.known,
         };
         let words = terms.words();
         size_of_record(head.points, words, head.findings)?;
         let word = |i: usize, column| self.word(order[i], column, channels);
         let mut raw = columns::planes(order.len(), words, word);
-        raw.extend(findings.iter().flat_map(finding_bytes));
+        raw.extend(findings.list.iter().flat_map(finding_bytes));
         let json = serde_json::to_vec(&head).ok()?;
         let mut body = (json.len() as u32).to_le_bytes().to_vec();
         body.extend(json);
@@ -268,12 +273,15 @@ fn record_of(
     head: &Head,
     terms: &Compatibility,
     camera: &Camera,
-) -> Option<(TracedPoints, Vec<Finding>)> {
+) -> Option<(TracedPoints, Findings)> {
     let words = terms.words();
     let raw = inflated(body, size_of_record(head.points, words, head.findings)?)?;
     let (points, findings) = raw.split_at_checked(4 * words * head.points)?;
-    let findings: Option<Vec<Finding>> = findings.chunks_exact(FINDING).map(finding_of).collect();
-    Some((points_of(points, head.points, terms, camera)?, findings?))
+    let list: Option<Vec<Finding>> = findings.chunks_exact(FINDING).map(finding_of).collect();
+    let Head { lit, known, .. } = *head;
+    let findings = Findings { list: list?, lit, known };
+    let traced = points_of(points, head.points, terms, camera)?;
+    (known <= lit).then_some((traced, findings))
 }
 
 fn finding_bytes(finding: &Finding) -> [u8; FINDING] {
@@ -393,9 +401,10 @@ mod tests {
         TracedPoints { points, ratios: (0..96).map(ratio).collect(), lights: Vec::new() }
     }
 
-    fn findings() -> Vec<Finding> {
+    fn findings() -> Findings {
         let one = Finding { level: 7, agreed: true, error: -0.5, noise: 0.25 };
-        vec![one, Finding { level: 0, agreed: false, error: 9.0, noise: 0.0 }]
+        let list = vec![one, Finding { level: 0, agreed: false, error: 9.0, noise: 0.0 }];
+        Findings { list, lit: 3, known: 2 }
     }
 
     fn encoded(traced: &TracedPoints, crop: Option<Rect>) -> Vec<u8> {
@@ -404,7 +413,7 @@ mod tests {
 
     fn seen_by(camera: &Camera, traced: &TracedPoints, crop: Option<Rect>) -> Vec<u8> {
         let (terms, findings) = (terms(), findings());
-        let (terms, findings, settings) = (&terms, &findings[..], "spp 1");
+        let (terms, findings, settings) = (&terms, &findings, "spp 1");
         let kept = ReferenceRecord { terms, frame: 7, camera, crop, traced, findings, settings };
         kept.encode().expect("small enough")
     }
@@ -435,13 +444,13 @@ mod tests {
         // The tail's stand-in may be less than what arrives.
         traced.ratios[50] = 16.0;
         let (camera, findings) = (camera(), findings());
-        let (camera, traced, findings, settings) = (&camera, &traced, &findings[..], "spp 1");
+        let (camera, traced, findings, settings) = (&camera, &traced, &findings, "spp 1");
         let crop = None;
         let record =
             ReferenceRecord { terms: &terms, frame: 7, camera, crop, traced, findings, settings };
         let back = read(&record.encode().expect("small enough"), &terms).expect("whole");
         let own = Reference::new(Reference::SUPPLIED, camera, traced, 2);
-        assert_eq!(format!("{back:?}"), format!("{:?}", own.with_findings(findings.to_vec())));
+        assert_eq!(format!("{back:?}"), format!("{:?}", own.with_findings(findings.clone())));
         // No other light's ratio is above 1.
         let mut wrong = traced.clone();
         wrong.ratios[0] = 16.0;

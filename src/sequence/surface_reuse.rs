@@ -14,12 +14,12 @@ use super::{FrameGraph, FrameMaker, Made, SaveCost};
 use crate::error::{Error, Result};
 use crate::inference::{Channels, Inference, TracedPoints};
 use crate::output::WriteOptions;
-use crate::reuse::evidence::Finding;
+use crate::reuse::evidence::Findings;
 use crate::reuse::store::{Compatibility, ReferenceRecord};
 use crate::reuse::{self, Judged, Lookup, LookupChannel, Reference};
 use crate::scene::{Camera, Rect};
 use crate::shade::{FrameJob, Progress, Rendered, Reuse};
-use probing::Probed;
+use probing::Probing;
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
@@ -50,8 +50,8 @@ struct State {
     early: BTreeMap<u32, Made>,
     /// The last representative of which a copy is still to be returned.
     again: Option<(u32, Made)>,
-    /// The frame whose probes were rendered last.
-    probed: Option<(u32, Arc<Probed>)>,
+    /// The frame whose probes were considered last.
+    probing: Option<(u32, Probing)>,
 }
 
 impl<'a> SurfaceReuse<'a> {
@@ -89,10 +89,10 @@ impl<'a> SurfaceReuse<'a> {
             Some(rendered) => rendered,
             None => self.rendered(frame, is_due, None, self.context.progress)?,
         };
-        let probed = self.probes(frame, &camera, &references)?;
+        let probing = self.probing(frame, &camera, &references)?;
         let mut audit = None;
-        let mut findings = &[][..];
-        if let Some(probed) = &probed {
+        let mut findings = &Findings::default();
+        if let Some(probed) = probing.probed() {
             audit = self.add_probes(frame, &camera, &references, probed, &mut rendered)?;
             findings = &probed.findings;
         }
@@ -101,14 +101,24 @@ impl<'a> SurfaceReuse<'a> {
         let sources = self.context.pool.install(|| sources.in_rows());
         let kept = self.kept(frame, &camera, &sources, findings);
         if is_due {
-            let own = camera.to_scene(&self.context.renderer.scene.recentring);
-            let channels = self.channels.len();
-            let new = || Reference::new(frame, &own, &sources, channels);
-            let reference = self.context.pool.install(new).with_findings(findings.to_vec());
-            self.keep(frame, reference);
-            self.save_later(frame, &camera, (&sources, findings), kept.as_ref());
+            self.keep_own(frame, &camera, (&sources, findings), kept.as_ref());
         }
         Ok(Made { film, rays, reuse, audit, reference: kept })
+    }
+
+    /// Keeps the reference of a frame, as far as it is in use; `kept` is what the frame's file will hold of it.
+    fn keep_own(
+        &self,
+        frame: u32,
+        camera: &Camera,
+        (sources, findings): (&TracedPoints, &Findings),
+        kept: Option<&Arc<[u8]>>,
+    ) {
+        let own = camera.to_scene(&self.context.renderer.scene.recentring);
+        let new = || Reference::new(frame, &own, sources, self.channels.len());
+        let reference = self.context.pool.install(new).with_findings(findings.clone());
+        self.keep(frame, reference);
+        self.save_later(frame, camera, (sources, findings), kept);
     }
 
     /// Renders the pixels of `mask` of a representative, or all. Its probes show their first trace.
@@ -121,34 +131,47 @@ impl<'a> SurfaceReuse<'a> {
     ) -> Result<Rendered> {
         let references = self.references(&self.schedule.ancestors(frame))?;
         let camera = self.context.camera(frame)?;
-        let probed = self.probes(frame, &camera, &references)?;
-        let known = probed.as_ref().map(|probed| probed.shown());
-        let job = FrameJob { mask, known, beyond_crop: is_due, ..self.context.job(frame, &camera) };
-        let Some(probed) = probed.as_ref().filter(|probed| probed.is_worth_lookups) else {
-            return self.render(job, None, progress);
+        let probing = self.probing(frame, &camera, &references)?;
+        let is_given_up = matches!(probing, Probing::GivenUp);
+        let probed = probing.probed();
+        let known = probed.map(|probed| probed.shown());
+        let beyond_crop = is_due && !is_given_up;
+        let is_source = beyond_crop || self.terms.is_some() && !is_given_up;
+        let job = FrameJob { mask, known, beyond_crop, ..self.context.job(frame, &camera) };
+        let Some(probed) = probed.filter(|probed| probed.is_worth_lookups) else {
+            return self.render(job, is_source, None, progress);
         };
         self.with_lookup((frame, &camera), &references, |lookup| {
             let evidence = |_| &probed.evidence;
             let tolerance = self.context.renderer.settings.reuse.tolerance;
             let judged =
                 lookup.as_ref().map(|lookup| Judged { lookup, evidence: &evidence, tolerance });
-            self.render(job, judged.as_ref().map(|judged| judged as &dyn Inference), progress)
+            let judged = judged.as_ref().map(|judged| judged as &dyn Inference);
+            self.render(job, is_source, judged, progress)
         })
     }
 
-    /// The probes of a representative; `None` where nothing can be inferred.
-    fn probes(
+    /// What probes decide for a representative.
+    fn probing(
         &self,
         frame: u32,
         camera: &Camera,
         references: &[Arc<Reference>],
-    ) -> Result<Option<Arc<Probed>>> {
+    ) -> Result<Probing> {
         if self.context.renderer.settings.reuse.probes == 0.0 {
-            return Ok(None);
+            return Ok(Probing::NoSource);
         }
-        self.with_lookup((frame, camera), references, |lookup| {
-            lookup.map(|lookup| self.probe(frame, camera, &lookup)).transpose()
-        })
+        let known = self.with_state(|s| s.probing.clone()).filter(|known| known.0 == frame);
+        if let Some((_, probing)) = known {
+            return Ok(probing);
+        }
+        let probing = self.with_lookup((frame, camera), references, |lookup| match lookup {
+            None => Ok(Probing::NoSource),
+            Some(lookup) if self.is_given_up(frame, &lookup) => Ok(Probing::GivenUp),
+            Some(lookup) => Ok(Probing::Probed(Arc::new(self.probe(frame, camera, &lookup)?))),
+        })?;
+        self.with_state(|s| s.probing = Some((frame, probing.clone())));
+        Ok(probing)
     }
 
     /// Calls `act` with the lookup of `frame`, seen by `camera` (world space), in `references` and in
@@ -173,10 +196,10 @@ impl<'a> SurfaceReuse<'a> {
     fn render(
         &self,
         job: FrameJob,
+        is_source: bool,
         inference: Option<&dyn Inference>,
         progress: &dyn Progress,
     ) -> Result<Rendered> {
-        let is_source = job.beyond_crop || self.terms.is_some();
         let reuse = Reuse { channels: &self.channels, inference, is_source };
         let reuse = (!self.channels.is_empty()).then_some(reuse);
         self.context.render(&FrameJob { reuse, ..job }, progress)
@@ -188,7 +211,7 @@ impl<'a> SurfaceReuse<'a> {
         frame: u32,
         camera: &Camera,
         traced: &TracedPoints,
-        findings: &[Finding],
+        findings: &Findings,
     ) -> Option<Arc<[u8]>> {
         let crop = self.context.renderer.settings.crop;
         self.encode(self.terms.as_ref()?, frame, camera, crop, (traced, findings))
@@ -200,7 +223,7 @@ impl<'a> SurfaceReuse<'a> {
         frame: u32,
         camera: &Camera,
         crop: Option<Rect>,
-        (traced, findings): (&TracedPoints, &[Finding]),
+        (traced, findings): (&TracedPoints, &Findings),
     ) -> Option<Arc<[u8]>> {
         let settings = &WriteOptions::of(self.context.renderer.settings, None).settings;
         let record = ReferenceRecord { terms, frame, camera, crop, traced, findings, settings };
@@ -218,11 +241,23 @@ impl<'a> SurfaceReuse<'a> {
         if let Some(found) = found.or_else(|| self.read_from_disk(frame)) {
             return Ok(found);
         }
-        let made = self.frame(frame)?;
-        let pool = self.references.lock();
-        if pool.asked(frame) > 0 {
-            self.with_state(|s| s.early.insert(frame, made));
+        let is_asked = self.references.lock().asked(frame) > 0;
+        let references = self.references(&self.schedule.ancestors(frame))?;
+        let camera = self.context.camera(frame)?;
+        match (self.probing(frame, &camera, &references)?, is_asked) {
+            // Nobody wants its pixels, and it has no points.
+            (Probing::GivenUp, false) => {
+                drop(self.joined.take(frame));
+                let nothing = (&TracedPoints::default(), &Findings::default());
+                self.keep_own(frame, &camera, nothing, None);
+            }
+            (_, false) => drop(self.frame(frame)?),
+            (_, true) => {
+                let made = self.frame(frame)?;
+                self.with_state(|s| s.early.insert(frame, made));
+            }
         }
+        let pool = self.references.lock();
         let lost = || Error::Failed(format!("the reference of frame {frame} is lost"));
         pool.get(frame).cloned().ok_or_else(lost)
     }
@@ -260,7 +295,7 @@ impl<'a> SurfaceReuse<'a> {
         &self,
         frame: u32,
         camera: &Camera,
-        traced: (&TracedPoints, &[Finding]),
+        traced: (&TracedPoints, &Findings),
         kept: Option<&Arc<[u8]>>,
     ) {
         let saves = |c: &&Checkpoints| c.every.is_some() && self.pyramid.is_key(frame);

@@ -3,6 +3,7 @@
 
 use super::job::{Job, Ran, lines_that_say, says};
 use super::launch::{launched, under_mpirun};
+use super::reuse::hopeless;
 use serde_json::Value;
 use std::fs;
 use std::io::{BufRead, BufReader, Read};
@@ -77,6 +78,13 @@ fn the_bytes_are_the_same_on_1_to_16_ranks_with_references_sent_about() {
             assert!(sent(&stats, kind, "messages") > 0, "{name}: {kind}");
         }
     }
+}
+
+#[test]
+fn frames_that_are_given_up_are_the_same_on_1_to_8_ranks() {
+    let job = Job::new();
+    let line = format!("render {} --frames 2..16 --aovs reference --quiet", hopeless(&job));
+    same_bytes(&job, &line, "exr", &[(1, 2), (2, 1), (3, 1), (8, 1)]);
 }
 
 #[test]

@@ -319,3 +319,54 @@ fn inferred_frames_that_are_less_accurate_than_traced_ones_are_named() {
     assert_eq!(strict.code, Some(1), "{}", strict.err);
     assert!(strict.err.contains("error: inferred frames"), "{}", strict.err);
 }
+
+/// A scene under so few rays to the sky that lookups pay at best, and probes show that they do not.
+pub fn hopeless(job: &Job) -> &'static str {
+    let text = "[camera]\nframes = 17\n\
+        pan = { from = [-1, 1.5, 7], to = [1, 1.5, 7], target = [0, 0, 0] }\n\
+        [settings]\nsize = [48, 27]\nspp = 1\nvideo = false\nsky_samples = 32\n[sky]\nradiance = 0.3\n\
+        [reuse]\nsegment = 16\n[[mesh]]\nfile = 'cube.obj'\n\
+        [[mesh]]\nquad = { centre = [0, -1, 0], normal = 'y', size = [20, 20] }\n";
+    fs::write(job.path("hopeless.toml"), text).expect("written");
+    "hopeless.toml"
+}
+
+#[test]
+fn frames_in_which_nothing_is_to_be_gained_cast_the_rays_of_policy_off() {
+    let job = Job::new();
+    let scene = hopeless(&job);
+    let rays = |folder: &str, options: &str| -> Vec<Value> {
+        let line = format!("render {scene} --stats {folder}.json {options} -o {folder}/f_#.png");
+        job.done(&line);
+        let stats: Value =
+            serde_json::from_slice(&job.read(&format!("{folder}.json"))).expect("JSON");
+        let mut frames = stats["frames"].as_array().expect("frames").clone();
+        frames.sort_by_key(|frame| frame["frame"].as_u64());
+        frames.iter().map(|frame| frame["rays"].clone()).collect()
+    };
+    let (own, off) = (rays("all", ""), rays("off", "--policy off"));
+    let more: Vec<usize> = (1..=17).filter(|frame| own[frame - 1] != off[frame - 1]).collect();
+    // The middle and the quarters have probes: two frames of them are enough to give up the others.
+    assert_eq!(more, [5, 9, 13]);
+    assert!(frames(&job, "all", 1..=17) == frames(&job, "off", 1..=17));
+}
+
+#[test]
+fn frames_that_are_given_up_are_the_same_in_ranges_and_in_files_with_references() {
+    let job = Job::new();
+    let scene = hopeless(&job);
+    for options in ["--aovs reference", "--aovs reference --crop 8,4,40,20", "--aovs position"] {
+        // Frames 3 and 7, which are given up, and 6, whose neighbours they are, are asked for one after another.
+        for range in ["6..6", "3..7", "1..17"] {
+            job.done(&format!("render {scene} --frames {range} {options} -o part/f_#.exr"));
+        }
+        job.done(&format!("render {scene} {options} -o whole/f_#.exr"));
+        for frame in 1..=17 {
+            let of = |folder| job.read(&format!("{folder}/f_{frame}.exr"));
+            assert!(of("part") == of("whole"), "{options}, frame {frame}");
+        }
+        for folder in ["part", "whole"] {
+            fs::remove_dir_all(job.path(folder)).expect("removed");
+        }
+    }
+}

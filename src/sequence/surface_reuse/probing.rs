@@ -13,7 +13,7 @@ use crate::film::Film;
 use crate::inference::Inference;
 use crate::output::Display;
 use crate::reuse::audit::{self, AuditedFrame, AuditedPixel};
-use crate::reuse::evidence::{Evidence, Finding};
+use crate::reuse::evidence::{Evidence, Finding, Findings};
 use crate::reuse::{
     Judged, Lookup, PARTS, Probe, ProbeDraw, Reference, could_be_worth_lookups, is_worth_lookups,
 };
@@ -37,6 +37,36 @@ const LEAST: f64 = 25_000.0;
 const HOPELESS: f64 = 0.25;
 /// Largest share that is probed.
 const MOST: f64 = 0.25;
+/// How many other frames must show that nothing is to be gained before a frame is given up without a probe.
+const SHOWN: usize = 2;
+/// The least share of the points that each of these must know. Where they know fewer, closer frames could know more, and
+/// better.
+const SEEN: f64 = 0.9;
+/// How many times their findings are counted then. With more probes the evidence is less cautious: that there are few of
+/// them shall not decide.
+const COUNTED: f64 = 8.0;
+
+/// What probes decide for a frame.
+#[derive(Clone)]
+pub(super) enum Probing {
+    /// There is nothing to infer it from.
+    NoSource,
+    /// Probes of other frames show that nothing is to be gained. It is traced whole and is no source of other frames, which
+    /// are as hopeless.
+    GivenUp,
+    /// It has probes of its own.
+    Probed(Arc<Probed>),
+}
+
+impl Probing {
+    /// The frame's own probes, if it has any.
+    pub fn probed(&self) -> Option<&Probed> {
+        match self {
+            Self::Probed(probed) => Some(probed),
+            Self::NoSource | Self::GivenUp => None,
+        }
+    }
+}
 
 /// A frame's probes.
 pub(super) struct Probed {
@@ -49,7 +79,7 @@ pub(super) struct Probed {
     /// For each pixel its number of camera samples; empty where all have as many.
     counts: Vec<u32>,
     /// Findings of the probes, which are stored with the frame's reference.
-    pub findings: Vec<Finding>,
+    pub findings: Findings,
     /// The evidence for the rest of the frame.
     pub evidence: Evidence,
     /// For each part of the probes the evidence from the findings of the other parts.
@@ -76,21 +106,33 @@ fn sampling_of(counts: &[u32]) -> Sampling<'_> {
 }
 
 impl SurfaceReuse<'_> {
-    /// Renders the probes of `frame`, seen by `camera`; `lookup` gives their estimates.
-    pub(super) fn probe(
-        &self,
-        frame: u32,
-        camera: &Camera,
-        lookup: &Lookup,
-    ) -> Result<Arc<Probed>> {
-        if let Some((_, probed)) = self.with_state(|s| s.probed.clone()).filter(|p| p.0 == frame) {
-            return Ok(probed);
+    /// Whether to trace `frame` whole without a probe of its own: where each of several frames that it would be inferred
+    /// from knew nearly all of its points and showed that lookups do not pay.
+    pub(super) fn is_given_up(&self, frame: u32, lookup: &Lookup) -> bool {
+        let r = &self.context.renderer;
+        // What other jobs know is no part of what this one has found.
+        let is_own = |r: &&Reference| r.frame != Reference::SUPPLIED;
+        if !lookup.references.iter().all(is_own) || self.schedule.has_key_copy(frame) {
+            return false;
         }
+        let found = lookup.references.iter().map(|r| r.findings());
+        let found: Vec<&Findings> = found.filter(|found| !found.list.is_empty()).collect();
+        if found.len() < SHOWN || found.iter().any(|found| found.known_share() < SEEN) {
+            return false;
+        }
+        let all = found.iter().flat_map(|found| &found.list);
+        let evidence = Evidence::counted(all, COUNTED, r.settings.reuse.tolerance);
+        let cast = (r.scene, &self.channels, r.settings);
+        found.iter().all(|found| !is_worth_lookups(&evidence, found.list.iter(), cast, 0.0))
+    }
+
+    /// Renders the probes of `frame`, seen by `camera`; `lookup` gives their estimates.
+    pub(super) fn probe(&self, frame: u32, camera: &Camera, lookup: &Lookup) -> Result<Probed> {
         let r = &self.context.renderer;
         let tolerance = r.settings.reuse.tolerance;
         let cast = (r.scene, &self.channels, r.settings);
-        let before = || lookup.references.iter().flat_map(|r| r.findings());
-        let known = lookup.references.iter().filter(|r| !r.findings().is_empty()).count();
+        let before = || lookup.references.iter().flat_map(|r| &r.findings().list);
+        let known = lookup.references.iter().filter(|r| !r.findings().list.is_empty()).count();
         let pixels = f64::from(camera.width) * f64::from(camera.height);
         let usual = f64::from(r.settings.reuse.probes) * (LEAST / pixels).max(1.0);
         let is_worth = |known: &Evidence| is_worth_lookups(known, before(), cast, usual);
@@ -102,7 +144,7 @@ impl SurfaceReuse<'_> {
             let with_gbuffer = self.context.with_gbuffer && stream == STREAMS[0];
             let job = self.job(camera, frame | stream, mask);
             let job = FrameJob { with_gbuffer, sampling, ..job };
-            let rendered = self.render(job, Some(&probe as &dyn Inference), &())?;
+            let rendered = self.render(job, true, Some(&probe as &dyn Inference), &())?;
             Result::Ok((rendered, probe))
         };
         let estimated = |multiple: f64| {
@@ -112,12 +154,16 @@ impl SurfaceReuse<'_> {
             let (rendered, probe) = trace(&mask, STREAMS[0], Some(lookup), Sampling::Own)?;
             Result::Ok((draw, mask, rendered, probe))
         };
-        let could_be = |probe: &Probe| could_be_worth_lookups(probe.known_share(), cast);
+        let seen = |probe: &Probe| {
+            let (lit, known) = probe.lit_and_known();
+            Findings { list: Vec::new(), lit, known }
+        };
+        let could_be = |seen: &Findings| could_be_worth_lookups(seen.known_share(), cast);
         let usually = MULTIPLES[known.min(MULTIPLES.len() - 1)];
         let multiple = if is_hopeless { HOPELESS } else { usually };
         let (mut draw, mut mask, mut first, mut own) = estimated(multiple)?;
         let mut trial = RayCounts::default();
-        if known == 0 && could_be(&own) {
+        if known == 0 && could_be(&seen(&own)) {
             trial = first.rays;
             (draw, mask, first, own) = estimated(FIRST)?;
         }
@@ -128,7 +174,7 @@ impl SurfaceReuse<'_> {
         let samples = |[x, y]: [u32; 2]| {
             counts.get(first.film.index(x, y)).copied().unwrap_or(r.settings.spp)
         };
-        let could_be = could_be(&own);
+        let mut findings = seen(&own);
         let found = own.findings(again, r.settings.spp, &samples);
         let of_others = |part: usize| {
             let is_in = move |pixel: &[u32; 2]| draw.part(pixel[0], pixel[1]) == part;
@@ -137,11 +183,13 @@ impl SurfaceReuse<'_> {
         };
         let crossed =
             self.context.pool.install(|| (0..PARTS).into_par_iter().map(of_others).collect());
-        let findings: Vec<Finding> = found.iter().flat_map(|(_, f)| f).copied().collect();
-        let evidence = Evidence::of(before().chain(&findings), tolerance);
+        findings.list = found.iter().flat_map(|(_, f)| f).copied().collect();
+        let own: &[Finding] = &findings.list;
+        let evidence = Evidence::of(before().chain(own), tolerance);
         // The frame's own probes are traced in any case, so they cost nothing more.
-        let is_worth_lookups = could_be && is_worth_lookups(&evidence, findings.iter(), cast, 0.0);
-        let probed = Arc::new(Probed {
+        let is_worth_lookups =
+            could_be(&findings) && is_worth_lookups(&evidence, own.iter(), cast, 0.0);
+        Ok(Probed {
             draw,
             mask,
             traces: [first, second],
@@ -151,9 +199,7 @@ impl SurfaceReuse<'_> {
             evidence,
             crossed,
             is_worth_lookups,
-        });
-        self.with_state(|s| s.probed = Some((frame, Arc::clone(&probed))));
-        Ok(probed)
+        })
     }
 
     /// The job that traces the pixels of `mask`, also outside the crop, without records.
@@ -230,7 +276,7 @@ impl SurfaceReuse<'_> {
             let judged = Judged { lookup: &lookup, evidence: &evidence, tolerance };
             let job = self.job(camera, frame | STREAMS[2], &probed.mask);
             let job = FrameJob { sampling: probed.sampling(), ..job };
-            let inferred = self.render(job, Some(&judged), &())?;
+            let inferred = self.render(job, false, Some(&judged), &())?;
             Ok((inferred.rays, Some(inferred.film)))
         })
     }
