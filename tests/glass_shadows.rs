@@ -12,7 +12,7 @@ use std::f64::consts::PI;
 use std::path::Path;
 use tweenray::math::{Bounds3, DVec3, Rgb};
 use tweenray::reuse;
-use tweenray::reuse::evidence::Findings;
+use tweenray::reuse::evidence::ProbeFindings;
 use tweenray::reuse::store::{Compatibility, ReferenceRecord, decode};
 use tweenray::scene::{
     Camera, CameraPath, DirectionalLight, Environment, EnvironmentKind, Fog, Glass, GlassShadows,
@@ -312,7 +312,7 @@ fn what_is_kept_behind_coloured_glass_can_be_read_back() {
     let colours = traced.ratios.chunks(3).filter(|ratios| ratios[0] > ratios[2] + 0.1);
     assert!(colours.count() > 100);
     let terms = &Compatibility::of("world", &channels, &settings);
-    let (crop, findings, settings) = (None, &Findings::default(), "");
+    let (crop, findings, settings) = (None, &ProbeFindings::default(), "");
     let record = ReferenceRecord { terms, frame: 1, camera, crop, traced, findings, settings };
     let bytes = record.encode().expect("few");
     let recentring = &set.scene.recentring;

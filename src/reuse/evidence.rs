@@ -45,17 +45,17 @@ pub struct Finding {
 
 /// What the probes of a frame found.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Findings {
+pub struct ProbeFindings {
     /// The findings at the points that other frames know.
     pub list: Vec<Finding>,
-    /// How many points of camera samples any light may reach whose ratios are kept.
+    /// How many points of the probes' camera samples a light may reach whose ratios are kept.
     pub lit: u64,
-    /// Of how many of these other frames know a light.
+    /// How many of these have an estimate of a light.
     pub known: u64,
 }
 
-impl Findings {
-    /// The share of the lit points that other frames know.
+impl ProbeFindings {
+    /// The share of the lit points that have an estimate.
     pub fn known_share(&self) -> f64 {
         self.known as f64 / self.lit.max(1) as f64
     }

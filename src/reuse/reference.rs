@@ -8,7 +8,7 @@ mod contrast;
 mod gather;
 mod lists;
 
-use super::evidence::Findings;
+use super::evidence::ProbeFindings;
 use super::index::Index;
 use crate::inference::{SurfacePoint, TracedPoints};
 use crate::math::{DVec3, Vec3};
@@ -195,7 +195,7 @@ pub struct Reference {
     /// Finds samples that are not in `slots`: points seen in mirrors, through glass or beside another surface.
     pub(super) index: Index,
     /// The findings of the frame's probes.
-    findings: Findings,
+    findings: ProbeFindings,
 }
 
 impl Reference {
@@ -239,17 +239,17 @@ impl Reference {
             channels,
             lights,
             index,
-            findings: Findings::default(),
+            findings: ProbeFindings::default(),
         }
     }
 
     /// This reference with the findings of the frame's probes.
-    pub fn with_findings(self, findings: Findings) -> Self {
+    pub fn with_findings(self, findings: ProbeFindings) -> Self {
         Self { findings, ..self }
     }
 
     /// The findings of the frame's probes.
-    pub fn findings(&self) -> &Findings {
+    pub fn findings(&self) -> &ProbeFindings {
         &self.findings
     }
 

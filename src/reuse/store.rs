@@ -11,7 +11,7 @@
 
 use super::Reference;
 use super::columns::{self, deflated, inflated, take, take_u32};
-use super::evidence::{Finding, Findings};
+use super::evidence::{Finding, ProbeFindings};
 use super::risk::LEVELS;
 use crate::error::{Error, Result};
 use crate::inference::{Channel, Channels, SurfacePoint, TracedPoint, TracedPoints, most_ratio};
@@ -150,7 +150,7 @@ pub struct ReferenceRecord<'a> {
     /// The traced points, scene space.
     pub traced: &'a TracedPoints,
     /// The findings of the frame's probes.
-    pub findings: &'a Findings,
+    pub findings: &'a ProbeFindings,
     /// Settings in words.
     pub settings: &'a str,
 }
@@ -273,13 +273,13 @@ fn record_of(
     head: &Head,
     terms: &Compatibility,
     camera: &Camera,
-) -> Option<(TracedPoints, Findings)> {
+) -> Option<(TracedPoints, ProbeFindings)> {
     let words = terms.words();
     let raw = inflated(body, size_of_record(head.points, words, head.findings)?)?;
     let (points, findings) = raw.split_at_checked(4 * words * head.points)?;
     let list: Option<Vec<Finding>> = findings.chunks_exact(FINDING).map(finding_of).collect();
     let Head { lit, known, .. } = *head;
-    let findings = Findings { list: list?, lit, known };
+    let findings = ProbeFindings { list: list?, lit, known };
     let traced = points_of(points, head.points, terms, camera)?;
     (known <= lit).then_some((traced, findings))
 }
@@ -401,10 +401,10 @@ mod tests {
         TracedPoints { points, ratios: (0..96).map(ratio).collect(), lights: Vec::new() }
     }
 
-    fn findings() -> Findings {
+    fn findings() -> ProbeFindings {
         let one = Finding { level: 7, agreed: true, error: -0.5, noise: 0.25 };
         let list = vec![one, Finding { level: 0, agreed: false, error: 9.0, noise: 0.0 }];
-        Findings { list, lit: 3, known: 2 }
+        ProbeFindings { list, lit: 3, known: 2 }
     }
 
     fn encoded(traced: &TracedPoints, crop: Option<Rect>) -> Vec<u8> {

@@ -76,12 +76,6 @@ impl Schedule {
         ancestors
     }
 
-    /// Whether a copy of a representative is a key frame.
-    pub fn has_key_copy(&self, representative: u32) -> bool {
-        let of_it = self.copies.iter().filter(|(_, other)| **other == representative);
-        { of_it }.any(|(copy, _)| self.pyramid.is_key(*copy))
-    }
-
     /// How many frames are traced whole: key frames that are no copies.
     pub fn key_frames(&self) -> u32 {
         let copies = self.copies.keys().filter(|frame| self.pyramid.is_key(**frame)).count();
@@ -127,14 +121,6 @@ mod tests {
         let frames: Vec<u32> = (1..=100_000).collect();
         assert!(frames.iter().all(|f| still.representative(*f) == 1));
         assert_eq!(still.most_held(&frames), (0, 0));
-    }
-
-    #[test]
-    fn a_representative_may_stand_for_a_key_frame() {
-        // At rest in frames 1 to 9 and 17 to 25.
-        let schedule = schedule(8, &returning(33));
-        assert_eq!([9, 25].map(|key| schedule.representative(key)), [1, 17]);
-        assert_eq!([1, 13, 17, 29].map(|f| schedule.has_key_copy(f)), [true, false, true, false]);
     }
 
     #[test]

@@ -218,7 +218,7 @@ mod tests {
     use super::*;
     use crate::inference::{Channels, SurfacePoint, TracedPoint, TracedPoints};
     use crate::math::Vec3;
-    use crate::reuse::evidence::Findings;
+    use crate::reuse::evidence::ProbeFindings;
     use crate::reuse::store::ReferenceRecord;
     use crate::scene::{Pose, Settings};
 
@@ -321,7 +321,7 @@ mod tests {
                 camera,
                 crop: None,
                 traced: &TracedPoints::default(),
-                findings: &Findings::default(),
+                findings: &ProbeFindings::default(),
                 settings: "",
             };
             let record = record.encode().expect("few points");

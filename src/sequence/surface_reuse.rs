@@ -14,12 +14,12 @@ use super::{FrameGraph, FrameMaker, Made, SaveCost};
 use crate::error::{Error, Result};
 use crate::inference::{Channels, Inference, TracedPoints};
 use crate::output::WriteOptions;
-use crate::reuse::evidence::Findings;
+use crate::reuse::evidence::ProbeFindings;
 use crate::reuse::store::{Compatibility, ReferenceRecord};
 use crate::reuse::{self, Judged, Lookup, LookupChannel, Reference};
 use crate::scene::{Camera, Rect};
 use crate::shade::{FrameJob, Progress, Rendered, Reuse};
-use probing::Probing;
+use probing::{Probed, Probing};
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
@@ -50,8 +50,8 @@ struct State {
     early: BTreeMap<u32, Made>,
     /// The last representative of which a copy is still to be returned.
     again: Option<(u32, Made)>,
-    /// The frame whose probes were considered last.
-    probing: Option<(u32, Probing)>,
+    /// The frame whose probes were rendered last.
+    probed: Option<(u32, Arc<Probed>)>,
 }
 
 impl<'a> SurfaceReuse<'a> {
@@ -91,7 +91,7 @@ impl<'a> SurfaceReuse<'a> {
         };
         let probing = self.probing(frame, &camera, &references)?;
         let mut audit = None;
-        let mut findings = &Findings::default();
+        let mut findings = &ProbeFindings::default();
         if let Some(probed) = probing.probed() {
             audit = self.add_probes(frame, &camera, &references, probed, &mut rendered)?;
             findings = &probed.findings;
@@ -111,7 +111,7 @@ impl<'a> SurfaceReuse<'a> {
         &self,
         frame: u32,
         camera: &Camera,
-        (sources, findings): (&TracedPoints, &Findings),
+        (sources, findings): (&TracedPoints, &ProbeFindings),
         kept: Option<&Arc<[u8]>>,
     ) {
         let own = camera.to_scene(&self.context.renderer.scene.recentring);
@@ -136,7 +136,7 @@ impl<'a> SurfaceReuse<'a> {
         let probed = probing.probed();
         let known = probed.map(|probed| probed.shown());
         let beyond_crop = is_due && !is_given_up;
-        let is_source = beyond_crop || self.terms.is_some() && !is_given_up;
+        let is_source = !is_given_up && (is_due || self.terms.is_some());
         let job = FrameJob { mask, known, beyond_crop, ..self.context.job(frame, &camera) };
         let Some(probed) = probed.filter(|probed| probed.is_worth_lookups) else {
             return self.render(job, is_source, None, progress);
@@ -161,17 +161,19 @@ impl<'a> SurfaceReuse<'a> {
         if self.context.renderer.settings.reuse.probes == 0.0 {
             return Ok(Probing::NoSource);
         }
-        let known = self.with_state(|s| s.probing.clone()).filter(|known| known.0 == frame);
-        if let Some((_, probing)) = known {
-            return Ok(probing);
+        let known = self.with_state(|s| s.probed.clone()).filter(|known| known.0 == frame);
+        if let Some((_, probed)) = known {
+            return Ok(Probing::Probed(probed));
         }
-        let probing = self.with_lookup((frame, camera), references, |lookup| match lookup {
+        self.with_lookup((frame, camera), references, |lookup| match lookup {
             None => Ok(Probing::NoSource),
-            Some(lookup) if self.is_given_up(frame, &lookup) => Ok(Probing::GivenUp),
-            Some(lookup) => Ok(Probing::Probed(Arc::new(self.probe(frame, camera, &lookup)?))),
-        })?;
-        self.with_state(|s| s.probing = Some((frame, probing.clone())));
-        Ok(probing)
+            Some(lookup) if self.is_given_up(&lookup) => Ok(Probing::GivenUp),
+            Some(lookup) => {
+                let probed = Arc::new(self.probe(frame, camera, &lookup)?);
+                self.with_state(|s| s.probed = Some((frame, Arc::clone(&probed))));
+                Ok(Probing::Probed(probed))
+            }
+        })
     }
 
     /// Calls `act` with the lookup of `frame`, seen by `camera` (world space), in `references` and in
@@ -211,7 +213,7 @@ impl<'a> SurfaceReuse<'a> {
         frame: u32,
         camera: &Camera,
         traced: &TracedPoints,
-        findings: &Findings,
+        findings: &ProbeFindings,
     ) -> Option<Arc<[u8]>> {
         let crop = self.context.renderer.settings.crop;
         self.encode(self.terms.as_ref()?, frame, camera, crop, (traced, findings))
@@ -223,7 +225,7 @@ impl<'a> SurfaceReuse<'a> {
         frame: u32,
         camera: &Camera,
         crop: Option<Rect>,
-        (traced, findings): (&TracedPoints, &Findings),
+        (traced, findings): (&TracedPoints, &ProbeFindings),
     ) -> Option<Arc<[u8]>> {
         let settings = &WriteOptions::of(self.context.renderer.settings, None).settings;
         let record = ReferenceRecord { terms, frame, camera, crop, traced, findings, settings };
@@ -245,10 +247,11 @@ impl<'a> SurfaceReuse<'a> {
         let references = self.references(&self.schedule.ancestors(frame))?;
         let camera = self.context.camera(frame)?;
         match (self.probing(frame, &camera, &references)?, is_asked) {
-            // Nobody wants its pixels, and it has no points.
+            // Nobody wants its pixels, and it has no points. Ranks may have traced strips of it, since who plans them does
+            // not know the findings.
             (Probing::GivenUp, false) => {
                 drop(self.joined.take(frame));
-                let nothing = (&TracedPoints::default(), &Findings::default());
+                let nothing = (&TracedPoints::default(), &ProbeFindings::default());
                 self.keep_own(frame, &camera, nothing, None);
             }
             (_, false) => drop(self.frame(frame)?),
@@ -295,7 +298,7 @@ impl<'a> SurfaceReuse<'a> {
         &self,
         frame: u32,
         camera: &Camera,
-        traced: (&TracedPoints, &Findings),
+        traced: (&TracedPoints, &ProbeFindings),
         kept: Option<&Arc<[u8]>>,
     ) {
         let saves = |c: &&Checkpoints| c.every.is_some() && self.pyramid.is_key(frame);

@@ -83,8 +83,15 @@ fn the_bytes_are_the_same_on_1_to_16_ranks_with_references_sent_about() {
 #[test]
 fn frames_that_are_given_up_are_the_same_on_1_to_8_ranks() {
     let job = Job::new();
-    let line = format!("render {} --frames 2..16 --aovs reference --quiet", hopeless(&job));
+    let scene = hopeless(&job);
+    let line = format!("render {scene} --frames 2..16 --aovs reference --quiet");
     same_bytes(&job, &line, "exr", &[(1, 2), (2, 1), (3, 1), (8, 1)]);
+    // Frames 3 and 7 are references that nobody wants to see.
+    let adaptive = "--spp 1..4 --shadow-samples 2..16";
+    for options in ["", adaptive] {
+        let line = format!("render {scene} --frames 6..6 {options} --quiet");
+        same_bytes(&job, &line, "png", &[(2, 1), (3, 1), (8, 1)]);
+    }
 }
 
 #[test]

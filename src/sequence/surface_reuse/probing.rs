@@ -13,7 +13,7 @@ use crate::film::Film;
 use crate::inference::Inference;
 use crate::output::Display;
 use crate::reuse::audit::{self, AuditedFrame, AuditedPixel};
-use crate::reuse::evidence::{Evidence, Finding, Findings};
+use crate::reuse::evidence::{Evidence, Finding, ProbeFindings};
 use crate::reuse::{
     Judged, Lookup, PARTS, Probe, ProbeDraw, Reference, could_be_worth_lookups, is_worth_lookups,
 };
@@ -37,22 +37,22 @@ const LEAST: f64 = 25_000.0;
 const HOPELESS: f64 = 0.25;
 /// Largest share that is probed.
 const MOST: f64 = 0.25;
-/// How many other frames must show that nothing is to be gained before a frame is given up without a probe.
-const SHOWN: usize = 2;
-/// The least share of the points that each of these must know. Where they know fewer, closer frames could know more, and
-/// better.
-const SEEN: f64 = 0.9;
+/// How many reference frames with probes it takes at least to give a frame up without a probe.
+const LEAST_PROBED: usize = 2;
+/// The least share of the probed points of each of these that had an estimate. Where fewer had, closer frames could know more,
+/// and better.
+const LEAST_KNOWN: f64 = 0.9;
 /// How many times their findings are counted then. With more probes the evidence is less cautious: that there are few of
 /// them shall not decide.
-const COUNTED: f64 = 8.0;
+const TIMES: f64 = 8.0;
 
 /// What probes decide for a frame.
 #[derive(Clone)]
 pub(super) enum Probing {
-    /// There is nothing to infer it from.
+    /// There is nothing to infer it from, or nothing is to be inferred.
     NoSource,
-    /// Probes of other frames show that nothing is to be gained. It is traced whole and is no source of other frames, which
-    /// are as hopeless.
+    /// Probes of other frames show that nothing is to be gained. It is traced whole and is no source of other frames: being
+    /// one costs more than its probes would.
     GivenUp,
     /// It has probes of its own.
     Probed(Arc<Probed>),
@@ -78,8 +78,8 @@ pub(super) struct Probed {
     trial: RayCounts,
     /// For each pixel its number of camera samples; empty where all have as many.
     counts: Vec<u32>,
-    /// Findings of the probes, which are stored with the frame's reference.
-    pub findings: Findings,
+    /// ProbeFindings of the probes, which are stored with the frame's reference.
+    pub findings: ProbeFindings,
     /// The evidence for the rest of the frame.
     pub evidence: Evidence,
     /// For each part of the probes the evidence from the findings of the other parts.
@@ -106,24 +106,24 @@ fn sampling_of(counts: &[u32]) -> Sampling<'_> {
 }
 
 impl SurfaceReuse<'_> {
-    /// Whether to trace `frame` whole without a probe of its own: where each of several frames that it would be inferred
-    /// from knew nearly all of its points and showed that lookups do not pay.
-    pub(super) fn is_given_up(&self, frame: u32, lookup: &Lookup) -> bool {
+    /// Whether to trace the frame of `lookup` whole without a probe of its own: where the probes of several frames that it
+    /// would be inferred from nearly all had estimates, and lookups would have paid in none of these frames.
+    pub(super) fn is_given_up(&self, lookup: &Lookup) -> bool {
         let r = &self.context.renderer;
-        // What other jobs know is no part of what this one has found.
-        let is_own = |r: &&Reference| r.frame != Reference::SUPPLIED;
-        if !lookup.references.iter().all(is_own) || self.schedule.has_key_copy(frame) {
+        // What other jobs know may tell more than this one's frames tell one another.
+        if lookup.references.iter().any(|r| r.frame == Reference::SUPPLIED) {
             return false;
         }
-        let found = lookup.references.iter().map(|r| r.findings());
-        let found: Vec<&Findings> = found.filter(|found| !found.list.is_empty()).collect();
-        if found.len() < SHOWN || found.iter().any(|found| found.known_share() < SEEN) {
+        let all = lookup.references.iter().map(|r| r.findings());
+        let probed: Vec<&ProbeFindings> = all.filter(|found| !found.list.is_empty()).collect();
+        let is_seen = |found: &&ProbeFindings| found.known_share() >= LEAST_KNOWN;
+        if probed.len() < LEAST_PROBED || !probed.iter().all(is_seen) {
             return false;
         }
-        let all = found.iter().flat_map(|found| &found.list);
-        let evidence = Evidence::counted(all, COUNTED, r.settings.reuse.tolerance);
+        let findings = probed.iter().flat_map(|found| &found.list);
+        let evidence = Evidence::counted(findings, TIMES, r.settings.reuse.tolerance);
         let cast = (r.scene, &self.channels, r.settings);
-        found.iter().all(|found| !is_worth_lookups(&evidence, found.list.iter(), cast, 0.0))
+        probed.iter().all(|found| !is_worth_lookups(&evidence, found.list.iter(), cast, 0.0))
     }
 
     /// Renders the probes of `frame`, seen by `camera`; `lookup` gives their estimates.
@@ -156,9 +156,9 @@ impl SurfaceReuse<'_> {
         };
         let seen = |probe: &Probe| {
             let (lit, known) = probe.lit_and_known();
-            Findings { list: Vec::new(), lit, known }
+            ProbeFindings { list: Vec::new(), lit, known }
         };
-        let could_be = |seen: &Findings| could_be_worth_lookups(seen.known_share(), cast);
+        let could_be = |seen: &ProbeFindings| could_be_worth_lookups(seen.known_share(), cast);
         let usually = MULTIPLES[known.min(MULTIPLES.len() - 1)];
         let multiple = if is_hopeless { HOPELESS } else { usually };
         let (mut draw, mut mask, mut first, mut own) = estimated(multiple)?;
@@ -276,6 +276,7 @@ impl SurfaceReuse<'_> {
             let judged = Judged { lookup: &lookup, evidence: &evidence, tolerance };
             let job = self.job(camera, frame | STREAMS[2], &probed.mask);
             let job = FrameJob { sampling: probed.sampling(), ..job };
+            // Nothing of it is shown, and the probes are sources already.
             let inferred = self.render(job, false, Some(&judged), &())?;
             Ok((inferred.rays, Some(inferred.film)))
         })
