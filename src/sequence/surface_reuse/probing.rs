@@ -47,7 +47,6 @@ const LEAST_KNOWN: f64 = 0.9;
 const TIMES: f64 = 8.0;
 
 /// What probes decide for a frame.
-#[derive(Clone)]
 pub(super) enum Probing {
     /// There is nothing to infer it from, or nothing is to be inferred.
     NoSource,
@@ -78,7 +77,7 @@ pub(super) struct Probed {
     trial: RayCounts,
     /// For each pixel its number of camera samples; empty where all have as many.
     counts: Vec<u32>,
-    /// ProbeFindings of the probes, which are stored with the frame's reference.
+    /// Findings of the probes, which are stored with the frame's reference.
     pub findings: ProbeFindings,
     /// The evidence for the rest of the frame.
     pub evidence: Evidence,
