@@ -218,8 +218,8 @@ impl Buffers {
     }
 }
 
-/// For each pixel a bit for each neighbour of [`AROUND`] that shows the same surface, then one for each of the eight
-/// nearest that shows another mesh, or none; `own` is the number of the pixel's point.
+/// For each pixel a bit for each neighbour of [`AROUND`] that shows the same surface, then one for each of the first
+/// four directions in which either nearest neighbour shows another mesh, or none; `own` is the number of the pixel's point.
 fn same_surface(
     points: &[SurfacePoint],
     pixels: usize,
@@ -250,8 +250,9 @@ fn same_row(mesh: &Image<u32>, normal: &[Image<f32>; 3], y: usize, same: &mut [u
             *same |= u32::from((own[x] == other[x]) & (cos > SAME_SURFACE)) << k;
         }
         if k < NEAR {
-            let lies_beside = |x: usize| u32::from(own[x] != other[x]) << (ALL + k);
-            same.iter_mut().enumerate().for_each(|(x, same)| *same |= lies_beside(x));
+            let direction = ALL + k.min(NEAR - 1 - k);
+            let edge = |x: usize| u32::from(own[x] != other[x]) << direction;
+            same.iter_mut().enumerate().for_each(|(x, same)| *same |= edge(x));
         }
     }
 }
@@ -287,25 +288,23 @@ fn near_row(known: &Image<f32>, y: usize, same: &[u32], bend: &mut [f32], wide: 
         *wide = if 2 * count >= ALL as u32 { *wide } else { f32::NAN };
     }
     // Along a stripe of shadow nothing bends, which tells nothing of what is across.
-    for (x, bend) in bend.iter_mut().enumerate().filter(|(x, _)| same[*x] >> ALL != 0) {
-        let beside = same[x] >> ALL;
-        let edges = (0..NEAR / 2).map(|k| ((beside >> k | beside >> (NEAR - 1 - k)) & 1) << k);
-        let edges = edges.sum::<u32>();
+    for (x, bend) in bend.iter_mut().enumerate() {
+        let edges = same[x] >> ALL;
         if CROSSES.iter().all(|cross| edges & cross != 0) && !bend.is_nan() {
-            *bend = bend.max(across((known, y), (same[x], edges), x).unwrap_or(0.0));
+            *bend = bend.max(across((known, y), same[x], x).unwrap_or(0.0));
         }
     }
 }
 
-/// The least bend of pixel `x` of row `y` in the directions of `edges`, a bit each, from two neighbours in line on one
-/// side; `None` where no such two are known.
-fn across((known, y): (&Image<f32>, usize), (same, edges): (u32, u32), x: usize) -> Option<f32> {
+/// The least bend of pixel `x` of row `y` in the directions that have an edge in `same`, from two neighbours in line on
+/// one side; `None` where no such two are known.
+fn across((known, y): (&Image<f32>, usize), same: u32, x: usize) -> Option<f32> {
     let own = known.own(y)[x];
     let at = |k: usize| {
         let ratio = known.row(y, AROUND[k])[x];
         (same >> k & 1 == 1 && !ratio.is_nan()).then_some(ratio)
     };
-    let sides = (0..NEAR).filter(|k| edges >> k.min(&(NEAR - 1 - k)) & 1 == 1);
+    let sides = (0..NEAR).filter(|k| same >> (ALL + k.min(&(NEAR - 1 - k))) & 1 == 1);
     let bends = sides.filter_map(|k| Some(0.5 * (own + at(BEHIND[k])? - 2.0 * at(k)?).abs()));
     bends.reduce(f32::min)
 }
