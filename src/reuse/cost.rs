@@ -9,34 +9,39 @@ use crate::inference::{Channel, Channels, SAMPLES_TOGETHER, check_rays};
 use crate::scene::{MeanLights, Scene, Settings};
 use crate::stats::{RayCounts, RayKind};
 
-/// Cost of a camera ray with the evaluation of its surface: the unit of cost.
-const CAMERA_RAY: f64 = 1.0;
-/// Cost of a ray from a mirror, perfect or rough, or glass, traced alone.
-const SPECULAR_RAY: f64 = 2.0;
-/// Cost of a shadow ray with its sample, in a scene of a million triangles.
-const SHADOW_RAY: f64 = 1.2;
-/// Cost of looking up one surface point in the first references.
-const LOOKUP: f64 = 1.5;
-/// Cost of looking up one surface point in all references and of keeping the point for other frames.
-const LOOKUP_IN_ALL: f64 = 4.7;
+// Nanoseconds that one core took where they were measured. Only their ratios count.
+
+/// Cost of a shadow ray with its sample in a scene of a few triangles.
+const SHADOW_RAY: f64 = 38.0;
+/// Binary logarithm of the number of triangles with which a shadow ray costs twice as much.
+const TWICE: f64 = 13.5;
+/// Cost of looking up one surface point in all references and of keeping the point for other frames, without lights.
+const LOOKUP: f64 = 250.0;
+/// Cost of looking up one light of a surface point.
+const LIGHT: f64 = 230.0;
+/// The same where each point has lights of its own, which are found in lists.
+const LISTED_LIGHT: f64 = 390.0;
 /// Cost of merging one camera sample into the surface point that it shares with others of its pixel.
-const JOINING: f64 = 0.75;
+const JOINING: f64 = 110.0;
 /// Cost of a check ray, in units of a shadow ray that is traced with many others of its point.
 const CHECK_RAY: f64 = 1.7;
+
+/// The share of points that frames with much to infer have inferred. Where that would not pay, nothing is tried: probes, and
+/// points that are kept for other frames, cost a twentieth to a tenth of a trace.
+const MOST_INFERRED: f64 = 0.85;
 /// The ratio of most points: no shadow.
 const OPEN: f32 = 1.0;
 
 /// Cost of a shadow ray with its sample in `scene`. With fewer triangles the tree is flatter, and more of it
-/// stays in the processor's caches: 43 ns were measured with a hundred triangles, 176 ns with a million.
+/// stays in the processor's caches.
 fn shadow_ray(scene: &Scene) -> f64 {
-    let of_depth = |depth: u32| 1.0 + (f64::from(depth) / 9.0).powi(2);
     let primitives = scene.triangle_count() + scene.spheres.len();
-    SHADOW_RAY * of_depth(primitives.max(1).ilog2()) / of_depth(1_000_000_u32.ilog2())
+    SHADOW_RAY * (1.0 + (libm::log2(primitives.max(1) as f64) / TWICE).powi(3))
 }
 
-/// Whether a lookup is cheaper than `rays` shadow rays.
+/// Whether looking up one light is cheaper than `rays` shadow rays to it.
 fn is_worth(scene: &Scene, rays: u32) -> bool {
-    f64::from(rays) * shadow_ray(scene) > LOOKUP
+    f64::from(rays) * shadow_ray(scene) > LIGHT
 }
 
 /// Whether to infer a light whose point is traced to others, which saves `rays` shadow rays: where its check rays cost at
@@ -85,7 +90,7 @@ pub fn channels(scene: &Scene, settings: &Settings) -> Channels {
             && is_worth(scene, expected_rays(channel, settings).saturating_mul(settings.spp))
     });
     let cost = PointCost::of(scene, &kept, settings, direct_samples(settings));
-    if cost.traced > cost.checked + cost.lookup {
+    if MOST_INFERRED * (cost.traced - cost.checked) > cost.lookup {
         kept
     } else {
         Channels::of(scene, cells, false, |_| false)
@@ -169,20 +174,21 @@ fn why(
     }
 }
 
-/// The cost of a frame that cast `rays` and looked up `lookups` surface points.
+/// The cost of a frame that cast `rays` and looked up `lookups` surface points, in camera rays, each with the look at
+/// its surface. In all scenes that were measured a shadow ray costs a sixth to a third of one.
 pub fn of_frame(rays: &RayCounts, lookups: u64) -> f64 {
     let of_kind = |kind| match kind {
-        RayKind::Camera => CAMERA_RAY,
-        RayKind::Mirror | RayKind::Glossy | RayKind::Glass => SPECULAR_RAY,
+        RayKind::Camera => 1.0,
+        // From a mirror, perfect or rough, or glass, traced alone; followed through glass.
+        RayKind::Mirror | RayKind::Glossy | RayKind::Glass | RayKind::ThroughGlass => 2.0,
         RayKind::ShadowArea | RayKind::ShadowDelta | RayKind::ShadowSky | RayKind::ShadowFog => {
-            SHADOW_RAY
+            0.25
         }
-        RayKind::ThroughGlass => SPECULAR_RAY,
         // Second tries are few, and part of what their first ones cost.
         RayKind::Retry | RayKind::Invalid => 0.0,
     };
     let of_rays = RayKind::ALL.map(|kind| of_kind(kind) * rays[kind] as f64);
-    of_rays.iter().sum::<f64>() + LOOKUP * lookups as f64
+    of_rays.iter().sum::<f64>() + 2.5 * lookups as f64
 }
 
 /// Number of camera samples of a pixel that share a lookup where they see one surface directly. Each sample that a mirror
@@ -193,11 +199,11 @@ fn direct_samples(settings: &Settings) -> u32 {
 
 /// Costs of the light of one surface point, whose camera samples are shaded together.
 struct PointCost {
-    /// Cost of tracing, in camera rays.
+    /// Cost of tracing.
     traced: f64,
-    /// Cost of check rays, likewise.
+    /// Cost of check rays.
     checked: f64,
-    /// Cost of looking the point up in all references and of merging its camera samples, likewise.
+    /// Cost of looking the point up in all references and of merging its camera samples.
     lookup: f64,
 }
 
@@ -219,9 +225,9 @@ impl PointCost {
         };
         let traced = |channel| samples.saturating_mul(expected_rays(channel, settings));
         // As if all lights were as bright.
-        let lights = match channels.slots() {
-            0 => (channels.len() / channels.colours()) as f64,
-            _ => area,
+        let (lights, light) = match channels.slots() {
+            0 => ((channels.len() / channels.colours()) as f64, LIGHT),
+            _ => (area, LISTED_LIGHT),
         };
         let checked = |channel| {
             let saved = samples.saturating_mul(rays_of(channel, settings));
@@ -230,7 +236,7 @@ impl PointCost {
         Self {
             traced: shadow_ray(scene) * sum(&traced),
             checked: shadow_ray(scene) * CHECK_RAY * sum(&checked),
-            lookup: LOOKUP_IN_ALL + JOINING * f64::from(samples),
+            lookup: LOOKUP + light * lights + JOINING * f64::from(samples),
         }
     }
 }
@@ -246,12 +252,13 @@ pub fn could_be_worth_lookups(
 }
 
 /// Whether lookups save more than they cost, by the `findings` of probes, if those estimates are used that
-/// `evidence` allows. A share `probed` of the points is probed, each of which is traced once more.
+/// `evidence` allows: by more than this many standard deviations of what so few findings tell. A share `probed` of the
+/// points is probed, each of which is traced once more.
 pub fn is_worth_lookups<'f>(
     evidence: &Evidence,
     findings: impl Iterator<Item = &'f Finding>,
     (scene, channels, settings): (&Scene, &Channels, &Settings),
-    probed: f64,
+    (probed, deviations): (f64, f64),
 ) -> bool {
     let of_samples = |samples| PointCost::of(scene, channels, settings, samples);
     let (direct, specular) = (of_samples(direct_samples(settings)), of_samples(1));
@@ -266,7 +273,14 @@ pub fn is_worth_lookups<'f>(
         };
         saved - probed * cost.traced - cost.lookup
     };
-    findings.map(gain).sum::<f64>() > 0.0
+    let (mut count, mut sum, mut squares) = (0.0, 0.0, 0.0);
+    for gain in findings.map(gain) {
+        count += 1.0;
+        sum += gain;
+        squares += gain * gain;
+    }
+    let variance = (squares - sum * sum / f64::max(count, 1.0)).max(0.0);
+    sum > deviations * variance.sqrt()
 }
 
 #[cfg(test)]
@@ -291,7 +305,12 @@ mod tests {
             let exact = Finding { level: level as u8, agreed: true, error: 0.0, noise: 1.0 };
             let findings = vec![exact; count];
             let evidence = Evidence::of(findings.iter(), 0.25);
-            is_worth_lookups(&evidence, findings.iter(), (&scene, &channels, &settings), 0.01)
+            is_worth_lookups(
+                &evidence,
+                findings.iter(),
+                (&scene, &channels, &settings),
+                (0.01, 0.0),
+            )
         };
         let (direct, specular) = (0, 2 * STEPS);
         assert!(is_worth(direct, 100, 16) && !is_worth(specular, 100, 16));

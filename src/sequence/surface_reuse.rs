@@ -19,7 +19,7 @@ use crate::reuse::store::{Compatibility, ReferenceRecord};
 use crate::reuse::{self, Judged, Lookup, LookupChannel, Reference};
 use crate::scene::{Camera, Rect};
 use crate::shade::{FrameJob, Progress, Rendered, Reuse};
-use probing::{Probed, Probing};
+use probing::Probing;
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
@@ -50,8 +50,8 @@ struct State {
     early: BTreeMap<u32, Made>,
     /// The last representative of which a copy is still to be returned.
     again: Option<(u32, Made)>,
-    /// The frame whose probes were rendered last.
-    probed: Option<(u32, Arc<Probed>)>,
+    /// What was decided last, and for which frame.
+    probing: Option<(u32, Probing)>,
 }
 
 impl<'a> SurfaceReuse<'a> {
@@ -161,19 +161,17 @@ impl<'a> SurfaceReuse<'a> {
         if self.context.renderer.settings.reuse.probes == 0.0 {
             return Ok(Probing::NoSource);
         }
-        let known = self.with_state(|s| s.probed.clone()).filter(|known| known.0 == frame);
-        if let Some((_, probed)) = known {
-            return Ok(Probing::Probed(probed));
+        let known = self.with_state(|s| s.probing.clone()).filter(|known| known.0 == frame);
+        if let Some((_, probing)) = known {
+            return Ok(probing);
         }
-        self.with_lookup((frame, camera), references, |lookup| match lookup {
+        let probing = self.with_lookup((frame, camera), references, |lookup| match lookup {
             None => Ok(Probing::NoSource),
             Some(lookup) if self.is_given_up(&lookup) => Ok(Probing::GivenUp),
-            Some(lookup) => {
-                let probed = Arc::new(self.probe(frame, camera, &lookup)?);
-                self.with_state(|s| s.probed = Some((frame, Arc::clone(&probed))));
-                Ok(Probing::Probed(probed))
-            }
-        })
+            Some(lookup) => Ok(Probing::Probed(Arc::new(self.probe(frame, camera, &lookup)?))),
+        })?;
+        self.with_state(|s| s.probing = Some((frame, probing.clone())));
+        Ok(probing)
     }
 
     /// Calls `act` with the lookup of `frame`, seen by `camera` (world space), in `references` and in

@@ -148,6 +148,8 @@ pub(super) struct Groups {
     traced: Vec<bool>,
     /// Whether any kept light could shine on it.
     lit: Vec<bool>,
+    /// Whether nobody infers points or wants them as sources.
+    is_counted_alone: bool,
     /// Surface points that must be traced whatever is known.
     forbidden: Vec<bool>,
     /// Surface points that a camera ray out of focus ends at; empty where the lens blurs nothing.
@@ -176,14 +178,24 @@ impl Groups {
         unshadowed: &[f32],
         pixels: &BlockPixels,
     ) {
+        let (count, channels) = (self.asked.points.len(), reuse.channels.len());
+        self.asked.ratios.clear();
+        self.asked.ratios.resize(count * channels, f32::NAN);
+        for flags in [&mut self.traced, &mut self.lit] {
+            flags.clear();
+            flags.resize(count, false);
+        }
+        self.asked.checks.clear();
+        self.asked.checked.clear();
+        self.is_counted_alone = reuse.inference.is_none() && !reuse.is_source;
+        if self.is_counted_alone {
+            return;
+        }
         self.asked.refinement = (pixels.samples_after() as f32 / input.least as f32).max(1.0);
         self.note_blurred(input, lit);
         self.forbid(input, scene, lit, pixels);
         self.measure_footprints(lit, pixels);
-        self.gather_unshadowed(reuse.channels.len(), unshadowed);
-        let (count, channels) = (self.asked.points.len(), reuse.channels.len());
-        self.asked.ratios.clear();
-        self.asked.ratios.resize(count * channels, f32::NAN);
+        self.gather_unshadowed(channels, unshadowed);
         self.asked.provenance.clear();
         self.asked.provenance.resize(count, Provenance::default());
         self.asked.pixels.clear();
@@ -191,12 +203,6 @@ impl Groups {
         self.asked.pixels.extend(self.pixels.iter().map(place));
         self.gathered.clear();
         self.gathered.resize(count * channels, Gathered::default());
-        for flags in [&mut self.traced, &mut self.lit] {
-            flags.clear();
-            flags.resize(count, false);
-        }
-        self.asked.checks.clear();
-        self.asked.checked.clear();
         if let Some(inference) = reuse.inference {
             inference.infer(&mut self.asked);
             let Self { asked: LookupBatch { ratios, estimates, checks, .. }, forbidden, .. } = self;
@@ -468,6 +474,9 @@ impl Groups {
     pub fn add(&mut self, i: usize, channel: usize, channels: usize, open: f64, all: f64) {
         let group = self.of_lit[i] as usize;
         self.traced[group] = true;
+        if self.is_counted_alone {
+            return;
+        }
         let gathered = &mut self.gathered[group * channels + channel];
         gathered.open += open;
         gathered.all += all;
@@ -492,6 +501,10 @@ impl Groups {
                 false => (&mut counts.specular, &mut counts.specular_inferred),
             };
             *lit += 1;
+            if self.is_counted_alone {
+                pixels.join_provenance(self.pixels[i], None);
+                continue;
+            }
             *inferred += u64::from(!self.traced[i]);
             let inferred = (!self.traced[i]).then_some(&self.asked.provenance[i]);
             pixels.join_provenance(self.pixels[i], inferred);

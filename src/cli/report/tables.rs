@@ -14,8 +14,8 @@ use std::collections::BTreeMap;
 
 /// How to read the table of effects.
 pub const EFFECTS_NOTE: &str = "Cost is weighed by fixed figures (a camera ray with the look at its \
-    surface is 1; a mirror, glossy or glass ray, or a shadow ray followed through glass, 2; another shadow ray 1.2; \
-    a lookup 1.5). It is an estimate: effects run interleaved, so their seconds cannot be measured one by one.";
+    surface is 1; a mirror, glossy or glass ray, or a shadow ray followed through glass, 2; another shadow ray 0.25; \
+    a lookup 2.5). It is an estimate: effects run interleaved, so their seconds cannot be measured one by one.";
 
 /// Rays by the effect that cast them, with their shares.
 pub fn effects(job: &Job) -> Table {

@@ -35,18 +35,21 @@ const FIRST: f64 = 4.0;
 const LEAST: f64 = 25_000.0;
 /// Multiple of the usual share if the findings of other frames say that lookups do not pay.
 const HOPELESS: f64 = 0.25;
+/// By how many standard deviations of what they tell findings must say that lookups pay, where others say that they do not.
+const DOUBT: f64 = 2.0;
 /// Largest share that is probed.
 const MOST: f64 = 0.25;
-/// How many reference frames with probes it takes at least to give a frame up without a probe.
-const LEAST_PROBED: usize = 2;
-/// The least share of the probed points of each of these that had an estimate. Where fewer had, closer frames could know more,
-/// and better.
+/// How many reference frames must have had estimates for nearly all of their probed points before a frame is given up without
+/// a probe.
+const LEAST_KNOWING: usize = 2;
+/// The share of the points that is nearly all. Where fewer have estimates, closer frames could know more, and better.
 const LEAST_KNOWN: f64 = 0.9;
-/// How many times their findings are counted then. With more probes the evidence is less cautious: that there are few of
+/// How many times the findings of reference frames are counted then. With more probes the evidence is less cautious: that there are few of
 /// them shall not decide.
 const TIMES: f64 = 8.0;
 
 /// What probes decide for a frame.
+#[derive(Clone)]
 pub(super) enum Probing {
     /// There is nothing to infer it from, or nothing is to be inferred.
     NoSource,
@@ -105,8 +108,8 @@ fn sampling_of(counts: &[u32]) -> Sampling<'_> {
 }
 
 impl SurfaceReuse<'_> {
-    /// Whether to trace the frame of `lookup` whole without a probe of its own: where the probes of several frames that it
-    /// would be inferred from nearly all had estimates, and lookups would have paid in none of these frames.
+    /// Whether to trace the frame of `lookup` whole without a probe of its own: where in several of the frames that it
+    /// would be inferred from nearly all probes had estimates, and lookups would have paid in none that has probes.
     pub(super) fn is_given_up(&self, lookup: &Lookup) -> bool {
         let r = &self.context.renderer;
         // What other jobs know may tell more than this one's frames tell one another.
@@ -115,14 +118,15 @@ impl SurfaceReuse<'_> {
         }
         let all = lookup.references.iter().map(|r| r.findings());
         let probed: Vec<&ProbeFindings> = all.filter(|found| !found.list.is_empty()).collect();
-        let is_seen = |found: &&ProbeFindings| found.known_share() >= LEAST_KNOWN;
-        if probed.len() < LEAST_PROBED || !probed.iter().all(is_seen) {
+        let known = probed.iter().filter(|found| found.known_share() >= LEAST_KNOWN);
+        if known.count() < LEAST_KNOWING {
             return false;
         }
         let findings = probed.iter().flat_map(|found| &found.list);
         let evidence = Evidence::counted(findings, TIMES, r.settings.reuse.tolerance);
         let cast = (r.scene, &self.channels, r.settings);
-        probed.iter().all(|found| !is_worth_lookups(&evidence, found.list.iter(), cast, 0.0))
+        let pays = |list: &[Finding]| is_worth_lookups(&evidence, list.iter(), cast, (0.0, DOUBT));
+        !probed.iter().any(|found| pays(&found.list))
     }
 
     /// Renders the probes of `frame`, seen by `camera`; `lookup` gives their estimates.
@@ -134,7 +138,7 @@ impl SurfaceReuse<'_> {
         let known = lookup.references.iter().filter(|r| !r.findings().list.is_empty()).count();
         let pixels = f64::from(camera.width) * f64::from(camera.height);
         let usual = f64::from(r.settings.reuse.probes) * (LEAST / pixels).max(1.0);
-        let is_worth = |known: &Evidence| is_worth_lookups(known, before(), cast, usual);
+        let is_worth = |known: &Evidence| is_worth_lookups(known, before(), cast, (usual, 0.0));
         let is_hopeless = known > 0 && !is_worth(&Evidence::of(before(), tolerance));
         // In mirrors and glass the footprint of a pixel is computed from neighbouring pixels.
         let block = if r.plan().mirror || r.plan().glass { 2 } else { 1 };
@@ -185,9 +189,11 @@ impl SurfaceReuse<'_> {
         findings.list = found.iter().flat_map(|(_, f)| f).copied().collect();
         let own: &[Finding] = &findings.list;
         let evidence = Evidence::of(before().chain(own), tolerance);
-        // The frame's own probes are traced in any case, so they cost nothing more.
+        // The frame's own probes are traced in any case, so they cost nothing more. Where those of others say that lookups do
+        // not pay, few of its own shall not say otherwise by chance.
+        let doubt = if is_hopeless { DOUBT } else { 0.0 };
         let is_worth_lookups =
-            could_be(&findings) && is_worth_lookups(&evidence, own.iter(), cast, 0.0);
+            could_be(&findings) && is_worth_lookups(&evidence, own.iter(), cast, (0.0, doubt));
         Ok(Probed {
             draw,
             mask,
