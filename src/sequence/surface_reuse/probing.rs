@@ -35,8 +35,6 @@ const FIRST: f64 = 4.0;
 const LEAST: f64 = 25_000.0;
 /// Multiple of the usual share if the findings of other frames say that lookups do not pay.
 const HOPELESS: f64 = 0.25;
-/// By how many standard deviations of what they tell findings must say that lookups pay, where others say that they do not.
-const DOUBT: f64 = 2.0;
 /// Largest share that is probed.
 const MOST: f64 = 0.25;
 /// How many reference frames must have had estimates for nearly all of their probed points before a frame is given up without
@@ -47,6 +45,9 @@ const LEAST_KNOWN: f64 = 0.9;
 /// How many times the findings of reference frames are counted then. With more probes the evidence is less cautious: that there are few of
 /// them shall not decide.
 const TIMES: f64 = 8.0;
+/// By how many standard deviations of what a reference frame's findings tell they must say that lookups pay, to keep others
+/// from being given up: few of them say so by chance.
+const DOUBT: f64 = 2.0;
 
 /// What probes decide for a frame.
 #[derive(Clone)]
@@ -189,11 +190,9 @@ impl SurfaceReuse<'_> {
         findings.list = found.iter().flat_map(|(_, f)| f).copied().collect();
         let own: &[Finding] = &findings.list;
         let evidence = Evidence::of(before().chain(own), tolerance);
-        // The frame's own probes are traced in any case, so they cost nothing more. Where those of others say that lookups do
-        // not pay, few of its own shall not say otherwise by chance.
-        let doubt = if is_hopeless { DOUBT } else { 0.0 };
+        // The frame's own probes are traced in any case, so they cost nothing more.
         let is_worth_lookups =
-            could_be(&findings) && is_worth_lookups(&evidence, own.iter(), cast, (0.0, doubt));
+            could_be(&findings) && is_worth_lookups(&evidence, own.iter(), cast, (0.0, 0.0));
         Ok(Probed {
             draw,
             mask,
