@@ -185,6 +185,8 @@ impl Groups {
             flags.clear();
             flags.resize(count, false);
         }
+        self.asked.provenance.clear();
+        self.asked.provenance.resize(count, Provenance::default());
         self.asked.checks.clear();
         self.asked.checked.clear();
         self.is_counted_alone = reuse.inference.is_none() && !reuse.is_source;
@@ -196,8 +198,6 @@ impl Groups {
         self.forbid(input, scene, lit, pixels);
         self.measure_footprints(lit, pixels);
         self.gather_unshadowed(channels, unshadowed);
-        self.asked.provenance.clear();
-        self.asked.provenance.resize(count, Provenance::default());
         self.asked.pixels.clear();
         let place = |pixel: &u32| <[u32; 2]>::from(pixels.place(*pixel));
         self.asked.pixels.extend(self.pixels.iter().map(place));
@@ -501,14 +501,10 @@ impl Groups {
                 false => (&mut counts.specular, &mut counts.specular_inferred),
             };
             *lit += 1;
-            if self.is_counted_alone {
-                pixels.join_provenance(self.pixels[i], None);
-                continue;
-            }
             *inferred += u64::from(!self.traced[i]);
             let inferred = (!self.traced[i]).then_some(&self.asked.provenance[i]);
             pixels.join_provenance(self.pixels[i], inferred);
-            if self.traced[i] && !self.is_blurred(i) {
+            if self.traced[i] && !self.is_counted_alone && !self.is_blurred(i) {
                 let own = i * channels..(i + 1) * channels;
                 let sent = &self.asked.unshadowed[own.clone()];
                 let mut known = self.asked.ratios[own.clone()].iter().zip(sent);
