@@ -9,7 +9,7 @@ use crate::inference::{Channel, Channels, SAMPLES_TOGETHER, check_rays};
 use crate::scene::{MeanLights, Scene, Settings};
 use crate::stats::{RayCounts, RayKind};
 
-// Nanoseconds that one core took where they were measured. Only their ratios count.
+// Nanoseconds on one core of the machine that they were measured on. Only their ratios count.
 
 /// Cost of a shadow ray with its sample in a scene of a few triangles.
 const SHADOW_RAY: f64 = 38.0;
@@ -26,7 +26,7 @@ const JOINING: f64 = 110.0;
 /// Cost of a check ray, in units of a shadow ray that is traced with many others of its point.
 const CHECK_RAY: f64 = 1.7;
 
-/// The share of points that frames with much to infer have inferred. Where that would not pay, nothing is tried: probes, and
+/// The largest share of points to expect to be inferred. Where that would not pay, nothing is tried: probes, and
 /// points that are kept for other frames, cost a twentieth to a tenth of a trace.
 const MOST_INFERRED: f64 = 0.85;
 /// The ratio of most points: no shadow.
@@ -252,7 +252,7 @@ pub fn could_be_worth_lookups(
 }
 
 /// Whether lookups save more than they cost, by the `findings` of probes, if those estimates are used that
-/// `evidence` allows: by more than this many standard deviations of what so few findings tell. A share `probed` of the
+/// `evidence` allows: by more than `deviations` standard deviations of the sum of their gains. A share `probed` of the
 /// points is probed, each of which is traced once more.
 pub fn is_worth_lookups<'f>(
     evidence: &Evidence,

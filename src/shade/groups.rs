@@ -148,7 +148,7 @@ pub(super) struct Groups {
     traced: Vec<bool>,
     /// Whether any kept light could shine on it.
     lit: Vec<bool>,
-    /// Whether nobody infers points or wants them as sources.
+    /// Whether points are only counted: nothing is inferred, and they are no sources.
     is_counted_alone: bool,
     /// Surface points that must be traced whatever is known.
     forbidden: Vec<bool>,

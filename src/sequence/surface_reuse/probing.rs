@@ -45,8 +45,8 @@ const LEAST_KNOWN: f64 = 0.9;
 /// How many times the findings of reference frames are counted then. With more probes the evidence is less cautious: that there are few of
 /// them shall not decide.
 const TIMES: f64 = 8.0;
-/// By how many standard deviations of what a reference frame's findings tell they must say that lookups pay, to keep others
-/// from being given up: few of them say so by chance.
+/// A reference frame counts as one in which lookups pay only if its gain is more than this many standard deviations above zero: a few
+/// lucky findings shall not keep others from being given up.
 const DOUBT: f64 = 2.0;
 
 /// What probes decide for a frame.
