@@ -39,9 +39,14 @@ fn shadow_ray(scene: &Scene) -> f64 {
     SHADOW_RAY * (1.0 + (libm::log2(primitives.max(1) as f64) / TWICE).powi(3))
 }
 
-/// Whether looking up one light is cheaper than `rays` shadow rays to it.
-fn is_worth(scene: &Scene, rays: u32) -> bool {
-    f64::from(rays) * shadow_ray(scene) > LIGHT
+/// Cost of looking up one light of a surface point.
+fn light(scene: &Scene, settings: &Settings) -> f64 {
+    if scene.selected_lights(settings).is_some() { LISTED_LIGHT } else { LIGHT }
+}
+
+/// Whether looking up the light of `channel` is cheaper than the shadow rays that a pixel casts to it.
+fn is_worth(scene: &Scene, settings: &Settings, channel: Channel) -> bool {
+    f64::from(pixel_rays(channel, settings)) * shadow_ray(scene) > light(scene, settings)
 }
 
 /// Whether to infer a light whose point is traced to others, which saves `rays` shadow rays: where its check rays cost at
@@ -76,6 +81,11 @@ fn expected_rays(channel: Channel, settings: &Settings) -> u32 {
     }
 }
 
+/// Expected number of shadow rays of a pixel in a channel.
+fn pixel_rays(channel: Channel, settings: &Settings) -> u32 {
+    expected_rays(channel, settings).saturating_mul(settings.spp)
+}
+
 /// The lights whose ratios are worth keeping.
 pub fn channels(scene: &Scene, settings: &Settings) -> Channels {
     let plan = EffectPlan::of(scene, settings);
@@ -86,8 +96,7 @@ pub fn channels(scene: &Scene, settings: &Settings) -> Channels {
             Channel::Sky(_) => plan.sky_light,
         };
         // The camera samples of a pixel share one lookup.
-        runs && plan.diffuse
-            && is_worth(scene, expected_rays(channel, settings).saturating_mul(settings.spp))
+        runs && plan.diffuse && is_worth(scene, settings, channel)
     });
     let cost = PointCost::of(scene, &kept, settings, direct_samples(settings));
     if MOST_INFERRED * (cost.traced - cost.checked) > cost.lookup {
@@ -112,19 +121,16 @@ pub struct LookupReason {
 pub fn lookup_reasons(scene: &Scene, settings: &Settings) -> Vec<LookupReason> {
     let kept = channels(scene, settings);
     let EffectPlan { diffuse, sky_light, .. } = EffectPlan::of(scene, settings);
-    let expected = |channel| {
-        let varies = settings.most_spp.is_some() || settings.least_shadow_samples.is_some();
-        (expected_rays(channel, settings), settings.spp, varies)
-    };
+    let soft = scene.lights.iter().filter(|light| light.is_area()).count();
+    let is_alone = soft + usize::from(sky_light) == 1;
+    let why = |channel, looked_up| why((scene, settings, channel), looked_up, diffuse, is_alone);
     let mut reasons = Vec::new();
-    let area = |channel, looked_up| why(scene, expected(channel), looked_up, diffuse);
     let delta = || "one hard shadow ray is not worth a lookup".to_string();
     if scene.selected_lights(settings).is_some() {
         // Too many to list: they differ by nothing that decides.
-        let (soft, hard): (Vec<_>, Vec<_>) = scene.lights.iter().partition(|l| l.is_area());
-        let looked_up = kept.slots() > 0;
-        let soft = (soft.len(), "area light", looked_up, area(Channel::Selected(0, 0), looked_up));
-        for (count, kind, looked_up, why) in [soft, (hard.len(), "delta light", false, delta())] {
+        let (looked_up, hard) = (kept.slots() > 0, scene.lights.len() - soft);
+        let soft = (soft, "area light", looked_up, why(Channel::Selected(0, 0), looked_up));
+        for (count, kind, looked_up, why) in [soft, (hard, "delta light", false, delta())] {
             if count > 0 {
                 reasons.push(LookupReason { light: counted(count, kind), looked_up, why });
             }
@@ -133,44 +139,44 @@ pub fn lookup_reasons(scene: &Scene, settings: &Settings) -> Vec<LookupReason> {
         for (index, light) in scene.lights.iter().enumerate() {
             let channel = light.is_area().then_some(Channel::Area(index as u32, 0));
             let looked_up = kept.of_light(index as u32).is_some();
-            let why = channel.map_or_else(delta, |channel| area(channel, looked_up));
+            let why = channel.map_or_else(delta, |channel| why(channel, looked_up));
             let light = format!("light {}, {}", index + 1, light.name());
             reasons.push(LookupReason { light, looked_up, why });
         }
     }
     if sky_light {
         let looked_up = !kept.sky().is_empty();
-        let why = why(scene, expected(Channel::Sky(0)), looked_up, diffuse);
+        let why = why(Channel::Sky(0), looked_up);
         reasons.push(LookupReason { light: "sky".into(), looked_up, why });
     }
     reasons
 }
 
-/// Why `rays` shadow rays of each of `spp` camera samples, numbers that may `vary`, are `looked_up` or not.
+/// Why the light of `channel` is `looked_up` or not; whether it `is_alone`: no other light has an extent.
 fn why(
-    scene: &Scene,
-    (rays, spp, vary): (u32, u32, bool),
+    (scene, settings, channel): (&Scene, &Settings, Channel),
     looked_up: bool,
     diffuse: bool,
+    is_alone: bool,
 ) -> String {
     if !diffuse {
         return "no diffuse surface: what a rough mirror shows depends on the view".into();
     }
-    let all = rays.saturating_mul(spp);
-    if all == 0 {
-        return "it has no samples".into();
-    }
+    let all = pixel_rays(channel, settings);
+    let vary = settings.most_spp.is_some() || settings.least_shadow_samples.is_some();
     let rays = match all {
+        0 => return "it has no samples".into(),
         1 => "one shadow ray".into(),
         _ if vary => format!("{all} or so shadow rays"),
         _ => format!("{all} shadow rays"),
     };
-    match (looked_up, is_worth(scene, all)) {
+    match (looked_up, is_worth(scene, settings, channel)) {
         (true, _) => format!("one lookup costs less than a pixel's {rays}"),
-        (false, false) => format!("a lookup costs more than a pixel's {rays}"),
-        (false, true) => {
+        (false, true) if !is_alone => {
             format!("a pixel's {rays}, and those to other lights, are too few for reuse")
         }
+        (false, true) => format!("a pixel's {rays} are too few for reuse"),
+        (false, false) => format!("a lookup costs more than a pixel's {rays}"),
     }
 }
 
@@ -224,10 +230,11 @@ impl PointCost {
             channels.iter().map(|channel| share(channel) * f64::from(of(channel))).sum()
         };
         let traced = |channel| samples.saturating_mul(expected_rays(channel, settings));
-        // As if all lights were as bright.
-        let (lights, light) = match channels.slots() {
-            0 => ((channels.len() / channels.colours()) as f64, LIGHT),
-            _ => (area, LISTED_LIGHT),
+        // A light is looked up once, whatever its colours; all as if they were as bright.
+        let first = |channel: &Channel| channel.part() == 0;
+        let lights = match channels.slots() {
+            0 => channels.iter().filter(first).count() as f64,
+            slots => area + channels.iter().skip(slots).filter(first).count() as f64,
         };
         let checked = |channel| {
             let saved = samples.saturating_mul(rays_of(channel, settings));
@@ -236,7 +243,7 @@ impl PointCost {
         Self {
             traced: shadow_ray(scene) * sum(&traced),
             checked: shadow_ray(scene) * CHECK_RAY * sum(&checked),
-            lookup: LOOKUP + light * lights + JOINING * f64::from(samples),
+            lookup: LOOKUP + light(scene, settings) * lights + JOINING * f64::from(samples),
         }
     }
 }
@@ -252,8 +259,8 @@ pub fn could_be_worth_lookups(
 }
 
 /// Whether lookups save more than they cost, by the `findings` of probes, if those estimates are used that
-/// `evidence` allows: by more than `deviations` standard deviations of the sum of their gains. A share `probed` of the
-/// points is probed, each of which is traced once more.
+/// `evidence` allows: by more than `deviations` standard deviations that the sum of their gains would have
+/// if it were zero on average. A share `probed` of the points is probed, each of which is traced once more.
 pub fn is_worth_lookups<'f>(
     evidence: &Evidence,
     findings: impl Iterator<Item = &'f Finding>,
@@ -273,14 +280,11 @@ pub fn is_worth_lookups<'f>(
         };
         saved - probed * cost.traced - cost.lookup
     };
-    let (mut count, mut sum, mut squares) = (0.0, 0.0, 0.0);
-    for gain in findings.map(gain) {
-        count += 1.0;
-        sum += gain;
-        squares += gain * gain;
-    }
-    let variance = (squares - sum * sum / f64::max(count, 1.0)).max(0.0);
-    sum > deviations * variance.sqrt()
+    // About zero and not about their mean: a few findings that agree may do so by chance.
+    let (sum, squares) = findings
+        .map(gain)
+        .fold((0.0, 0.0), |(sum, squares), gain| (sum + gain, squares + gain * gain));
+    sum > deviations * squares.sqrt()
 }
 
 #[cfg(test)]
@@ -288,32 +292,88 @@ mod tests {
     use super::*;
     use crate::math::{DVec3, Rgb};
     use crate::reuse::risk::STEPS;
-    use crate::scene::{Light, Material, SphereLight, World, WorldSphere};
+    use crate::scene::{Light, Material, Sky, SphereLight, World, WorldSphere};
+
+    /// A grey room under `count` lamps and a sky of this `radiance`.
+    fn room(count: u32, radiance: f32) -> Scene {
+        let sky = Sky { radiance: Rgb::splat(radiance), ..Sky::default() };
+        let lamp = |k| {
+            let centre = DVec3::new(0.02 * f64::from(k), 1.0, 0.0);
+            Light::Sphere(SphereLight { centre, radius: 0.1, radiance: Rgb::ONE })
+        };
+        let lights = (0..count).map(lamp).collect();
+        let mut world = World { lights, sky, ..World::default() };
+        let grey = world.add_material(Material::diffuse("grey", Rgb::splat(0.5)));
+        world.spheres.push(WorldSphere::new("room", DVec3::ZERO, 2.0, grey));
+        world.into_scene(true).expect("a scene")
+    }
+
+    /// Whether lookups pay by more than this many deviations, by `count` findings without error.
+    fn pays(
+        scene: &Scene,
+        settings: &Settings,
+        level: usize,
+        (count, deviations): (usize, f64),
+    ) -> bool {
+        let channels = channels(scene, settings);
+        assert!(!channels.is_empty());
+        let exact = Finding { level: level as u8, agreed: true, error: 0.0, noise: 1.0 };
+        let findings = vec![exact; count];
+        let evidence = Evidence::of(std::iter::repeat_n(&exact, 100), 0.25);
+        is_worth_lookups(
+            &evidence,
+            findings.iter(),
+            (scene, &channels, settings),
+            (0.01, deviations),
+        )
+    }
 
     #[test]
     fn lookups_of_single_samples_in_mirrors_pay_with_more_rays_than_those_of_pixels() {
-        let light =
-            Light::Sphere(SphereLight { centre: DVec3::Y, radius: 0.1, radiance: Rgb::ONE });
-        let mut world = World { lights: vec![light], ..World::default() };
-        let grey = world.add_material(Material::diffuse("grey", Rgb::splat(0.5)));
-        world.spheres.push(WorldSphere::new("room", DVec3::ZERO, 2.0, grey));
-        let scene = world.into_scene(true).expect("a scene");
-        let is_worth = |level: usize, count: usize, shadow_samples| {
+        let scene = room(1, 0.0);
+        let is_worth = |level, shadow_samples| {
             let settings = Settings { spp: 4, shadow_samples, ..Settings::default() };
-            let channels = channels(&scene, &settings);
-            assert!(!channels.is_empty());
-            let exact = Finding { level: level as u8, agreed: true, error: 0.0, noise: 1.0 };
-            let findings = vec![exact; count];
-            let evidence = Evidence::of(findings.iter(), 0.25);
-            is_worth_lookups(
-                &evidence,
-                findings.iter(),
-                (&scene, &channels, &settings),
-                (0.01, 0.0),
-            )
+            pays(&scene, &settings, level, (100, 0.0))
         };
         let (direct, specular) = (0, 2 * STEPS);
-        assert!(is_worth(direct, 100, 16) && !is_worth(specular, 100, 16));
-        assert!(is_worth(specular, 100, 256));
+        assert!(is_worth(direct, 16) && !is_worth(specular, 16));
+        assert!(is_worth(specular, 256));
+    }
+
+    #[test]
+    fn what_a_few_findings_agree_on_may_be_chance() {
+        let settings = Settings { spp: 4, ..Settings::default() };
+        let pays = |count| pays(&room(1, 0.0), &settings, 0, (count, 2.0));
+        assert_eq!([1, 4, 5, 100].map(pays), [false, false, true, true]);
+    }
+
+    #[test]
+    fn the_sky_is_looked_up_beside_selected_lights_too() {
+        let settings = Settings { spp: 4, ..Settings::default() };
+        let lookup = |count, sky| {
+            let scene = room(count, sky);
+            let channels = channels(&scene, &settings);
+            (PointCost::of(&scene, &channels, &settings, 4).lookup, channels.tail().is_empty())
+        };
+        for (count, light) in [(1, LIGHT), (24, LISTED_LIGHT)] {
+            let (without, with) = (lookup(count, 0.0), lookup(count, 1.0));
+            assert_eq!(without.1, with.1);
+            assert!((with.0 - without.0 - light).abs() < 1e-9, "{count}: {without:?}, {with:?}");
+        }
+    }
+
+    #[test]
+    fn one_light_has_no_others_that_are_too_few() {
+        let settings = |shadow_samples| Settings {
+            shadow_samples,
+            sky_samples: 2 * shadow_samples,
+            ..Settings::default()
+        };
+        // Enough rays for a lookup of the light, too few for that of the point.
+        let rays = (1..64).find(|n| is_worth(&room(1, 0.0), &settings(*n), Channel::Area(0, 0)));
+        let settings = settings(rays.expect("a number"));
+        let told = |scene: &Scene| lookup_reasons(scene, &settings)[0].why.clone();
+        assert!(told(&room(1, 0.0)).ends_with("shadow rays are too few for reuse"));
+        assert!(told(&room(2, 0.0)).contains("those to other lights"));
     }
 }
