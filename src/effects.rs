@@ -366,7 +366,7 @@ fn light_selection(scene: &Scene, settings: &Settings, plan: &EffectPlan) -> Eff
             (false, format!("{lights}, all looked at everywhere: all lights are on"))
         }
         (Some(cells), Some(_)) => {
-            let MeanLights { main, area: _, tail, tail_samples: _ } = cells.mean();
+            let MeanLights { main, tail, .. } = cells.mean();
             let memory = cells.memory() as f64 / 1e6;
             let [of_light, of_tail] =
                 [1, cells.tints().len()].map(|own| ratio_count(own, plan.coloured_shadows));

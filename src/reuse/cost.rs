@@ -21,6 +21,8 @@ const LOOKUP: f64 = 250.0;
 const LIGHT: f64 = 230.0;
 /// The same where each point has lights of its own, which are found in lists.
 const LISTED_LIGHT: f64 = 390.0;
+/// Cost of each further ratio of a light that has one for each primary colour.
+const RATIO: f64 = 115.0;
 /// Cost of merging one camera sample into the surface point that it shares with others of its pixel.
 const JOINING: f64 = 110.0;
 /// Cost of a check ray, in units of a shadow ray that is traced with many others of its point.
@@ -39,14 +41,14 @@ fn shadow_ray(scene: &Scene) -> f64 {
     SHADOW_RAY * (1.0 + (libm::log2(primitives.max(1) as f64) / TWICE).powi(3))
 }
 
-/// Cost of looking up one light of a surface point.
-fn light(scene: &Scene, settings: &Settings) -> f64 {
-    if scene.selected_lights(settings).is_some() { LISTED_LIGHT } else { LIGHT }
-}
-
 /// Whether looking up the light of `channel` is cheaper than the shadow rays that a pixel casts to it.
 fn is_worth(scene: &Scene, settings: &Settings, channel: Channel) -> bool {
-    f64::from(pixel_rays(channel, settings)) * shadow_ray(scene) > light(scene, settings)
+    let lookup = match channel {
+        Channel::Selected(..) | Channel::Tail(_) => LISTED_LIGHT,
+        // At least: it is in a list where other lights are.
+        Channel::Area(..) | Channel::Sky(_) => LIGHT,
+    };
+    f64::from(pixel_rays(channel, settings)) * shadow_ray(scene) > lookup
 }
 
 /// Whether to infer a light whose point is traced to others, which saves `rays` shadow rays: where its check rays cost at
@@ -120,16 +122,20 @@ pub struct LookupReason {
 /// For each light that shines, then the sky: whether it is looked up or traced, and why.
 pub fn lookup_reasons(scene: &Scene, settings: &Settings) -> Vec<LookupReason> {
     let kept = channels(scene, settings);
-    let EffectPlan { diffuse, sky_light, .. } = EffectPlan::of(scene, settings);
+    let EffectPlan { diffuse, area_lights, sky_light, .. } = EffectPlan::of(scene, settings);
     let soft = scene.lights.iter().filter(|light| light.is_area()).count();
-    let is_alone = soft + usize::from(sky_light) == 1;
+    let is_alone = usize::from(area_lights) * soft + usize::from(sky_light) == 1;
     let why = |channel, looked_up| why((scene, settings, channel), looked_up, diffuse, is_alone);
     let mut reasons = Vec::new();
     let delta = || "one hard shadow ray is not worth a lookup".to_string();
-    if scene.selected_lights(settings).is_some() {
+    if let Some(cells) = scene.selected_lights(settings) {
         // Too many to list: they differ by nothing that decides.
         let (looked_up, hard) = (kept.slots() > 0, scene.lights.len() - soft);
-        let soft = (soft, "area light", looked_up, why(Channel::Selected(0, 0), looked_up));
+        let why = match cells.most_area() {
+            0 => "at no point one of them stands out from the others".into(),
+            _ => why(Channel::Selected(0, 0), looked_up),
+        };
+        let soft = (soft, "area light", looked_up, why);
         for (count, kind, looked_up, why) in [soft, (hard, "delta light", false, delta())] {
             if count > 0 {
                 reasons.push(LookupReason { light: counted(count, kind), looked_up, why });
@@ -152,7 +158,7 @@ pub fn lookup_reasons(scene: &Scene, settings: &Settings) -> Vec<LookupReason> {
     reasons
 }
 
-/// Why the light of `channel` is `looked_up` or not; whether it `is_alone`: no other light has an extent.
+/// Why the light of `channel` is `looked_up` or not; whether it `is_alone`, without others that have soft shadows.
 fn why(
     (scene, settings, channel): (&Scene, &Settings, Channel),
     looked_up: bool,
@@ -217,7 +223,7 @@ impl PointCost {
     /// Of a point of this many `samples`.
     fn of(scene: &Scene, channels: &Channels, settings: &Settings, samples: u32) -> Self {
         let mean = scene.light_cells.as_ref().map(|cells| cells.mean()).unwrap_or_default();
-        let MeanLights { area, tail_samples, .. } = mean;
+        let MeanLights { area, tails, tail_samples, .. } = mean;
         // Few points have as many lights as they have channels for.
         let share = |channel| match channel {
             Channel::Selected(..) => area / channels.slots() as f64,
@@ -230,12 +236,19 @@ impl PointCost {
             channels.iter().map(|channel| share(channel) * f64::from(of(channel))).sum()
         };
         let traced = |channel| samples.saturating_mul(expected_rays(channel, settings));
-        // A light is looked up once, whatever its colours; all as if they were as bright.
-        let first = |channel: &Channel| channel.part() == 0;
-        let lights = match channels.slots() {
-            0 => channels.iter().filter(first).count() as f64,
-            slots => area + channels.iter().skip(slots).filter(first).count() as f64,
+        // The part of the points that have the light of a channel.
+        let present = |channel| match channel {
+            Channel::Selected(..) => area * channels.colours() as f64 / channels.slots() as f64,
+            Channel::Tail(_) => tails,
+            Channel::Area(..) | Channel::Sky(_) => 1.0,
         };
+        let is_first = |channel: &Channel| channel.part() == 0;
+        let lights: f64 = channels.iter().filter(is_first).map(present).sum();
+        let light = if channels.slots() > 0 { LISTED_LIGHT } else { LIGHT };
+        let looked_up = channels
+            .iter()
+            .map(|channel| present(channel) * if is_first(&channel) { light } else { RATIO });
+        // As if all lights were as bright.
         let checked = |channel| {
             let saved = samples.saturating_mul(rays_of(channel, settings));
             check_rays(saved, 1.0 / lights.max(1.0) as f32, OPEN, false)
@@ -243,7 +256,7 @@ impl PointCost {
         Self {
             traced: shadow_ray(scene) * sum(&traced),
             checked: shadow_ray(scene) * CHECK_RAY * sum(&checked),
-            lookup: LOOKUP + light(scene, settings) * lights + JOINING * f64::from(samples),
+            lookup: LOOKUP + looked_up.sum::<f64>() + JOINING * f64::from(samples),
         }
     }
 }
@@ -292,10 +305,17 @@ mod tests {
     use super::*;
     use crate::math::{DVec3, Rgb};
     use crate::reuse::risk::STEPS;
-    use crate::scene::{Light, Material, Sky, SphereLight, World, WorldSphere};
+    use crate::scene::{
+        Environment, EnvironmentKind, Light, Material, PointLight, Sky, SkyGradient, SphereLight,
+        World, WorldSphere,
+    };
 
     /// A grey room under `count` lamps and a sky of this `radiance`.
     fn room(count: u32, radiance: f32) -> Scene {
+        world(count, radiance).into_scene(true).expect("a scene")
+    }
+
+    fn world(count: u32, radiance: f32) -> World {
         let sky = Sky { radiance: Rgb::splat(radiance), ..Sky::default() };
         let lamp = |k| {
             let centre = DVec3::new(0.02 * f64::from(k), 1.0, 0.0);
@@ -305,10 +325,10 @@ mod tests {
         let mut world = World { lights, sky, ..World::default() };
         let grey = world.add_material(Material::diffuse("grey", Rgb::splat(0.5)));
         world.spheres.push(WorldSphere::new("room", DVec3::ZERO, 2.0, grey));
-        world.into_scene(true).expect("a scene")
+        world
     }
 
-    /// Whether lookups pay by more than this many deviations, by `count` findings without error.
+    /// Whether `count` findings without error show a gain of more than `deviations` standard deviations.
     fn pays(
         scene: &Scene,
         settings: &Settings,
@@ -348,32 +368,66 @@ mod tests {
     }
 
     #[test]
-    fn the_sky_is_looked_up_beside_selected_lights_too() {
+    fn each_light_that_a_point_has_and_each_further_ratio_is_a_lookup() {
         let settings = Settings { spp: 4, ..Settings::default() };
-        let lookup = |count, sky| {
-            let scene = room(count, sky);
-            let channels = channels(&scene, &settings);
-            (PointCost::of(&scene, &channels, &settings, 4).lookup, channels.tail().is_empty())
+        let lookup = |scene: &Scene| {
+            let channels = channels(scene, &settings);
+            let cost = PointCost::of(scene, &channels, &settings, 4);
+            (cost.lookup - LOOKUP - 4.0 * JOINING, channels)
         };
-        for (count, light) in [(1, LIGHT), (24, LISTED_LIGHT)] {
-            let (without, with) = (lookup(count, 0.0), lookup(count, 1.0));
-            assert_eq!(without.1, with.1);
-            assert!((with.0 - without.0 - light).abs() < 1e-9, "{count}: {without:?}, {with:?}");
-        }
+        let is_near = |a: f64, b: f64| (a - b).abs() < 1e-9;
+        assert!(is_near(lookup(&room(1, 0.0)).0, LIGHT));
+        assert!(is_near(lookup(&room(2, 1.0)).0, 3.0 * LIGHT));
+        let [zenith, horizon, ground] = [Rgb::X, Rgb::Y, Rgb::Z];
+        let gradient = EnvironmentKind::Gradient(SkyGradient { zenith, horizon, ground });
+        let environment = Some(Environment::new(gradient));
+        let tinted = World { environment, ..world(1, 0.0) }.into_scene(true).expect("a scene");
+        let (cost, channels) = lookup(&tinted);
+        assert_eq!(channels.sky().len(), 3);
+        assert!(is_near(cost, 2.0 * LIGHT + 2.0 * RATIO));
+        // Selected lights.
+        let many = room(24, 1.0);
+        let (cost, channels) = lookup(&many);
+        assert!(channels.slots() > 0 && channels.tail().len() == 1);
+        let mean = many.light_cells.as_ref().map(|cells| cells.mean()).unwrap_or_default();
+        assert!(mean.area > 0.0 && mean.tails > 0.0, "{mean:?}");
+        assert!(is_near(cost, (mean.area + mean.tails + 1.0) * LISTED_LIGHT));
+    }
+
+    #[test]
+    fn a_sky_beside_many_lights_without_an_extent_is_in_no_list() {
+        let mut world = world(0, 1.0);
+        let point =
+            |k| Light::Point(PointLight { position: DVec3::Y / f64::from(k), intensity: Rgb::ONE });
+        world.lights = (1..20).map(point).collect();
+        let scene = world.into_scene(true).expect("a scene");
+        let settings = Settings { spp: 4, ..Settings::default() };
+        let channels = channels(&scene, &settings);
+        assert!(scene.selected_lights(&settings).is_some() && channels.len() == 1);
+        let cost = PointCost::of(&scene, &channels, &settings, 4);
+        assert_eq!(cost.lookup, LOOKUP + LIGHT + 4.0 * JOINING);
     }
 
     #[test]
     fn one_light_has_no_others_that_are_too_few() {
-        let settings = |shadow_samples| Settings {
-            shadow_samples,
-            sky_samples: 2 * shadow_samples,
-            ..Settings::default()
-        };
+        let settings =
+            |rays| Settings { shadow_samples: rays, sky_samples: rays, ..Settings::default() };
         // Enough rays for a lookup of the light, too few for that of the point.
         let rays = (1..64).find(|n| is_worth(&room(1, 0.0), &settings(*n), Channel::Area(0, 0)));
         let settings = settings(rays.expect("a number"));
-        let told = |scene: &Scene| lookup_reasons(scene, &settings)[0].why.clone();
-        assert!(told(&room(1, 0.0)).ends_with("shadow rays are too few for reuse"));
-        assert!(told(&room(2, 0.0)).contains("those to other lights"));
+        let told = |scene: &Scene, settings: &Settings| {
+            lookup_reasons(scene, settings).into_iter().map(|reason| reason.why).collect::<Vec<_>>()
+        };
+        let alone = "shadow rays are too few for reuse";
+        for scene in [room(1, 0.0), room(0, 1.0)] {
+            assert!(told(&scene, &settings)[0].ends_with(alone));
+        }
+        for scene in [room(2, 0.0), room(1, 1.0)] {
+            assert!(
+                told(&scene, &settings).iter().all(|why| why.contains("those to other lights"))
+            );
+        }
+        let no_shadows = Settings { shadow_samples: 0, ..settings };
+        assert!(told(&room(1, 1.0), &no_shadows)[1].ends_with(alone));
     }
 }

@@ -82,6 +82,8 @@ pub struct MeanLights {
     pub area: f64,
     /// Lights of the tail.
     pub tail: f64,
+    /// Tails: the share of the points that have one.
+    pub tails: f64,
     /// Samples of the tail, over those of a main light.
     pub tail_samples: f64,
 }

@@ -37,10 +37,10 @@ impl LightCells {
             });
         }
         let share = 1.0 / f64::from(next.max(1));
-        let MeanLights { main, area, tail, tail_samples } = means;
-        let [main, area, tail, tail_samples] =
-            [main, area, tail, tail_samples].map(|sum| sum * share);
-        MeanLights { main, area, tail, tail_samples }
+        let MeanLights { main, area, tail, tails, tail_samples } = means;
+        let [main, area, tail, tails, tail_samples] =
+            [main, area, tail, tails, tail_samples].map(|sum| sum * share);
+        MeanLights { main, area, tail, tails, tail_samples }
     }
 
     fn count_at(&self, p: DVec3, scene: &Scene, sums: &mut MeanLights) {
@@ -50,7 +50,10 @@ impl LightCells {
         sums.area += lights.main().filter(is_area).count() as f64;
         let tail = lights.tail();
         sums.tail += tail.len() as f64;
-        sums.tail_samples += if tail.is_empty() { 0.0 } else { tail.samples_share() };
+        if !tail.is_empty() {
+            sums.tails += 1.0;
+            sums.tail_samples += tail.samples_share();
+        }
     }
 }
 

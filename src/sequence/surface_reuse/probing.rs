@@ -40,6 +40,8 @@ const MOST: f64 = 0.25;
 /// How many reference frames must have had estimates for nearly all of their probed points before a frame is given up without
 /// a probe.
 const LEAST_KNOWING: usize = 2;
+/// How many findings each of them must have: the gain of four or fewer is never more than chance.
+const LEAST_FINDINGS: usize = 16;
 /// The share of the points that is nearly all. Where fewer have estimates, closer frames could know more, and better.
 const LEAST_KNOWN: f64 = 0.9;
 /// How many times the findings of reference frames are counted then. With more probes the evidence is less cautious: that there are few of
@@ -119,8 +121,10 @@ impl SurfaceReuse<'_> {
         }
         let all = lookup.references.iter().map(|r| r.findings());
         let probed: Vec<&ProbeFindings> = all.filter(|found| !found.list.is_empty()).collect();
-        let known = probed.iter().filter(|found| found.known_share() >= LEAST_KNOWN);
-        if known.count() < LEAST_KNOWING {
+        let is_knowing = |found: &&&ProbeFindings| {
+            found.list.len() >= LEAST_FINDINGS && found.known_share() >= LEAST_KNOWN
+        };
+        if probed.iter().filter(is_knowing).count() < LEAST_KNOWING {
             return false;
         }
         let findings = probed.iter().flat_map(|found| &found.list);
