@@ -123,7 +123,7 @@ pub struct SettingArgs {
         allow_negative_numbers = true, value_parser = whole(0, limits::MAX_BOUNCES))]
     pub bounces: Option<u32>,
     /// Drop mirror and glass branches that contribute less than this share [default: 0.001]
-    #[arg(long, value_name = "SHARE", help_heading = "Light", allow_negative_numbers = true, value_parser = values::within_f32(limits::SHARE))]
+    #[arg(long, value_name = "SHARE", help_heading = "Light", allow_negative_numbers = true, value_parser = values::share_f32)]
     pub cutoff: Option<f32>,
     /// Seed of every random number [default: 0]
     #[arg(long, value_name = "N", help_heading = "Light", allow_negative_numbers = true,
@@ -159,7 +159,7 @@ pub struct ReuseArgs {
     /// Share of the pixels of an in-between frame that are estimated and also traced: the errors found
     /// decide what is inferred [default: 0.01]
     #[arg(long, value_name = "SHARE", help_heading = "Reuse",
-        allow_negative_numbers = true, value_parser = values::within_f32(limits::SHARE))]
+        allow_negative_numbers = true, value_parser = values::share_f32)]
     pub probes: Option<f32>,
     /// Colour policy: cached colours agree within this linear difference [default: 0.02]
     #[arg(long, value_name = "DIFFERENCE", help_heading = "Reuse",

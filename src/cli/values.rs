@@ -145,13 +145,6 @@ pub fn crop(text: &str) -> Result<Rect, String> {
 pub fn goal(text: &str) -> Result<Goal, String> {
     let wrong = "a target is written psnr=45, ssim=0.99, flip=0.02 or max-share=0.1%";
     let (figure, value) = text.split_once('=').ok_or(wrong)?;
-    let share = |text: &str| match text.strip_suffix('%') {
-        Some(percent) => within(0.0..=100.0)(percent).map(|p| 0.01 * p),
-        None => within(0.0..=1.0)(text).map_err(|wrong| match within(1.0..=100.0)(text) {
-            Ok(percent) => format!("{wrong}, or per cent with their sign: {percent}%"),
-            Err(_) => wrong,
-        }),
-    };
     let inner = |x: f64| match x > 0.0 && x < 1.0 {
         true => Ok(x),
         false => Err("this target has to lie between 0 and 1 (100 %), both excluded".to_string()),
@@ -230,6 +223,22 @@ pub fn within_f32(
     move |text| parse(text).map(|value| value as f32)
 }
 
+/// A share: `0.05` or `5%`.
+pub fn share(text: &str) -> Result<f64, String> {
+    if let Some(percent) = text.trim().strip_suffix('%') {
+        return within(0.0..=100.0)(percent).map(|percent| percent / 100.0);
+    }
+    within(limits::SHARE)(text).map_err(|wrong| match within(1.0..=100.0)(text) {
+        Ok(percent) => format!("{wrong}, or per cent with their sign: {percent}%"),
+        Err(_) => wrong,
+    })
+}
+
+/// As [`share`], for settings that are f32.
+pub fn share_f32(text: &str) -> Result<f32, String> {
+    share(text).map(|share| share as f32)
+}
+
 /// `1000`, but `1e30`.
 fn plain(x: f64) -> String {
     if x == 0.0 || (1e-3..1e6).contains(&x) { x.to_string() } else { format!("{x:e}") }
@@ -302,6 +311,17 @@ mod tests {
     }
 
     #[test]
+    fn shares_are_read_as_people_write_them() {
+        assert_eq!(
+            ["0", "1", "0.05", "5%", "5 %", "100%"].map(share),
+            [0.0, 1.0, 0.05, 0.05, 0.05, 1.0].map(Ok)
+        );
+        for text in ["1.5", "-0.1", "101%", "%", "x%", "nan", "5 per cent"] {
+            assert!(share(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
     fn a_budget_is_at_least_a_second() {
         assert_eq!(budget("1m30s"), Ok(Duration::from_secs(90)));
         let words = |text| budget(text).map(time_in_words).unwrap_or_default();
@@ -317,8 +337,6 @@ mod tests {
         for text in ["nan", "inf", "-1", "0", "1e99"] {
             assert!(within_f32(limits::FACTOR)(text).is_err(), "{text}");
         }
-        let share = within(limits::SHARE);
-        assert!(share("1.5").is_err() && share("0").is_ok());
         assert_eq!(within(limits::FPS)("0"), Err("expected a number from 1 to 1000".into()));
     }
 }
