@@ -59,6 +59,8 @@ pub struct SquaredErrors {
     pub error: f64,
     /// Squared error of a trace.
     pub trace: f64,
+    /// How much of `error` corrects for the display curve.
+    pub correction: f64,
 }
 
 impl SquaredErrors {
@@ -72,18 +74,23 @@ impl SquaredErrors {
     /// two traces show, which is right for normal noise.
     ///
     /// Higher orders remain: with noise of a third of the value, next to white, the error is
-    /// too small by a tenth of a trace's squared error; with half that noise the bias is negligible.
+    /// too small by a tenth of a trace's squared error; with half that noise the bias is negligible. Where few rays find
+    /// any light, as in a room lit through small windows, most of the sum may be missing. It is then off by up to as much as
+    /// the jackknife corrects.
     pub fn of(display: &Display, shown: Rgb, a: Rgb, b: Rgb) -> Self {
         let [i, m, a, b] = [shown, 0.5 * (a + b), a, b].map(|c| display.code(c));
-        let (mut error, mut trace) = (0.0, 0.0);
+        let (mut error, mut trace, mut correction) = (0.0, 0.0, 0.0);
         for k in 0..3 {
             let square = |x: f64| (i[k] - x) * (i[k] - x);
-            error += 2.0 * square(m[k]) - 0.5 * (square(a[k]) + square(b[k]));
+            let of_k = 2.0 * square(m[k]) - 0.5 * (square(a[k]) + square(b[k]));
+            error += of_k;
+            correction += of_k - (i[k] - a[k]) * (i[k] - b[k]);
             let bend = m[k] - 0.5 * (a[k] + b[k]);
             trace += 0.5 * (a[k] - b[k]) * (a[k] - b[k]) + 4.0 / 3.0 * bend * bend;
         }
         let scale = STEPS * STEPS / 3.0;
-        Self { error: error * scale, trace: trace * scale }
+        let [error, trace, correction] = [error, trace, correction].map(|sum| sum * scale);
+        Self { error, trace, correction }
     }
 }
 
@@ -107,12 +114,15 @@ pub fn sums(shown: &AuditedFrame, drawn: &[AuditedPixel], traces: [&[Rgb]; 2]) -
         let others = weight - 1.0;
         if shown.is_inferred(i) {
             sums.inferred_pixels += others as u64;
-            group.inferred.get_or_insert_default().add(squares.error, others, UNSEEN_INFERRED);
+            let inferred = group.inferred.get_or_insert_default();
+            inferred.add(squares.error, others, UNSEEN_INFERRED);
+            inferred.correction += others * squares.correction;
         }
         let trace = squares.trace / refinement;
         let mean = (others * squares.error + trace) / weight;
         let unseen = if shown.is_inferred(i) { UNSEEN_INFERRED } else { UNSEEN };
         group.shown.add(mean, *weight, unseen);
+        group.shown.correction += others * squares.correction;
         group.traced.add(trace, *weight, UNSEEN);
     }
     for Group { inferred, shown, traced } in groups.values() {
@@ -137,6 +147,8 @@ struct Part {
     sum: f64,
     /// Squared error assumed for the pixels that were not drawn.
     unseen: f64,
+    /// How much of the sum corrects for the display curve.
+    correction: f64,
 }
 
 impl Part {
@@ -147,6 +159,7 @@ impl Part {
 
     fn add_to(&self, sum: &mut DrawnSum) {
         sum.add(self.sum, 1.0, self.unseen);
+        sum.correction += self.correction;
     }
 }
 
@@ -178,8 +191,10 @@ pub fn is_worse_than_traced(sums: &AuditSums, tolerance: f32, audits: usize) -> 
 fn rmse_within(sums: &AuditSums, confidence: f64) -> Option<Rmse> {
     let over = |drawn: &DrawnSum, pixels: u64| {
         let total = drawn_sum_interval(drawn.sum, drawn.squares, drawn.largest, confidence);
-        let root = |x: f64| (x / pixels.max(1) as f64).sqrt();
-        Interval { estimate: root(total.estimate), low: root(total.low), high: root(total.high) }
+        let root = |x: f64| (x.max(0.0) / pixels.max(1) as f64).sqrt();
+        let doubt = drawn.correction.abs();
+        let (low, high) = (root(total.low - doubt), root(total.high + doubt));
+        Interval { estimate: root(total.estimate), low, high }
     };
     (sums.drawn > 0).then(|| Rmse {
         inferred: over(&sums.inferred, sums.inferred_pixels),
@@ -191,6 +206,7 @@ fn rmse_within(sums: &AuditSums, confidence: f64) -> Option<Rmse> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::film::ProvenanceKind;
     use crate::sampling::mix;
     use crate::scene::ToneCurve;
 
@@ -205,6 +221,42 @@ mod tests {
 
     fn mean(n: u32, of: impl Fn(u32) -> f64) -> f64 {
         (0..n).map(of).sum::<f64>() / f64::from(n)
+    }
+
+    /// Of 16 rays few find the light, as in a room that is lit through small windows.
+    #[test]
+    fn the_interval_contains_the_error_where_a_trace_finds_light_by_chance() {
+        let uniform = |k: u32| (mix(u64::from(k) + 7) >> 11) as f64 / (1u64 << 53) as f64;
+        for (truth, chance) in [(0.05f32, 0.1), (0.1, 0.1), (0.2, 0.2), (0.2, 0.3), (0.05, 0.05)] {
+            let n = 4000;
+            let trace = |k: u32| {
+                let found = (0..16).filter(|ray| uniform(16 * k + ray) < chance).count();
+                Rgb::splat(truth * found as f32 / (16.0 * chance as f32))
+            };
+            let shown = |k: u32| Rgb::splat(truth * (1.0 + 0.25 * noise(k)).max(0.0));
+            let traces = |first: u32| (0..n).map(|k| trace(2 * k + first)).collect::<Vec<Rgb>>();
+            let rgb: Vec<Rgb> = (0..n).map(shown).collect();
+            let both = Provenance { kind: ProvenanceKind::Both, ..Provenance::default() };
+            let inferred = vec![both; n as usize];
+            let frame = AuditedFrame { rgb: &rgb, provenance: &inferred, display: SRGB };
+            let drawn: Vec<AuditedPixel> = (0..n)
+                .map(|index| AuditedPixel {
+                    index,
+                    weight: 2.0,
+                    group: index.into(),
+                    refinement: 1.0,
+                })
+                .collect();
+            let sums = sums(&frame, &drawn, [&traces(0), &traces(1)]);
+            let apart =
+                |x: Rgb| ((SRGB.code(x)[0] - SRGB.code(Rgb::splat(truth))[0]) * 255.0).powi(2);
+            let error = mean(n, |k| apart(shown(k))).sqrt();
+            let found = rmse(&sums).expect("an audit").inferred;
+            assert!(
+                found.low <= error && error <= found.high,
+                "{truth}, {chance}: {error}, {found:?}"
+            );
+        }
     }
 
     /// Four pixels that err alike tell as much as one.

@@ -16,6 +16,10 @@ pub struct DrawnSum {
     pub squares: f64,
     /// The largest part that was drawn or, unseen, might have been.
     pub largest: f64,
+    /// How much of the sum corrects for the curve between what was measured and the figure. As much may be wrong with
+    /// the correction itself.
+    #[serde(default)]
+    pub correction: f64,
 }
 
 impl DrawnSum {
@@ -34,6 +38,7 @@ impl AddAssign for DrawnSum {
         self.sum += o.sum;
         self.squares += o.squares;
         self.largest = self.largest.max(o.largest);
+        self.correction += o.correction;
     }
 }
 
