@@ -7,7 +7,7 @@ use rand_pcg::Pcg64;
 use std::sync::atomic::AtomicBool;
 use tweenray::intersect::{EmbreeIntersector, Hit, Intersector, Oracle, PrimRef, Ray};
 use tweenray::math::DVec3;
-use tweenray::scene::{CameraPath, HitRules, Pose, Recheck, Scene, Settings, Shot};
+use tweenray::scene::{CameraPath, HitRules, Pose, Recheck, Scene, Settings, Shot, WorldMesh};
 use tweenray::stats::RayCounts;
 use tweenray::verify::{Answers, Check, Class, Kind, RayId, Tally, TracedRay};
 
@@ -263,6 +263,39 @@ fn a_ray_on_the_border_of_a_mesh_may_miss() {
         told += 1;
     }
     assert!(told > 10, "{told}");
+}
+
+/// A ray that passes a silhouette within the band may go on, although the surface behind it is so nearly parallel to the
+/// ray that one beside it ends long before. One that is further from the silhouette may not.
+#[test]
+fn a_ray_at_a_silhouette_may_pass_onto_a_grazed_floor() {
+    let corner = |k: u32| [k, k >> 1, k >> 2].map(|k| f64::from(k & 1));
+    let corners = (0..8).map(|k| DVec3::from(corner(k)) * DVec3::new(1.0, 1.0, -1.0)).collect();
+    let split = |[a, b, c, d]: [u32; 4]| [[a, b, c], [a, c, d]];
+    let sides =
+        [[0, 1, 3, 2], [5, 4, 6, 7], [4, 0, 2, 6], [1, 5, 7, 3], [2, 3, 7, 6], [4, 5, 1, 0]];
+    let block = WorldMesh::new("block", corners, sides.map(split).concat(), 0);
+    let at = |x, z| DVec3::new(x, -1e-4, z);
+    let positions = vec![at(-9.0, 9.0), at(9.0, 9.0), at(9.0, -9.0), at(-9.0, -9.0)];
+    let floor = WorldMesh::new("floor", positions, split([0, 1, 2, 3]).to_vec(), 0);
+    let mut world = shapes::world_of(block);
+    world.meshes.push(floor);
+    let scene = world.into_scene(true).unwrap();
+    let (settings, shot, oracle) = (Settings::default(), shot(), Oracle::new(&scene));
+    let check = Check::new(&scene, &settings, &shot, &oracle, &oracle);
+    let edge = [0, 1].map(|k| scene.meshes[0].positions[k].as_dvec3());
+    let class = |above: f64| {
+        let target = edge[0].lerp(edge[1], 0.37);
+        let dir = DVec3::new(0.01, -2e-4, -1.0);
+        let ray = Ray::new(target + DVec3::Y * above - dir, dir);
+        let hits = oracle.all_hits(&ray);
+        let behind = hits.iter().find(|h| h.hit.prim.geom_id == 1).unwrap();
+        assert_eq!(hits[0].hit.prim.geom_id, 0, "{above}");
+        let answers = Answers::Hits { product: Some(behind.hit), oracle: Some(hits[0].hit) };
+        check.judge(&TracedRay { ray, answers }).unwrap().class
+    };
+    assert_eq!([1e-10, 1e-8].map(class), [Class::EdgeBand; 2]);
+    assert_eq!(class(5e-6), Class::Missed);
 }
 
 #[test]

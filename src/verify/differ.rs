@@ -53,7 +53,7 @@ impl<'a> Closely<'a> {
     /// Classifies two closest hits.
     pub fn hits(&self, product: Option<Hit>, oracle: Option<Hit>) -> Option<Difference> {
         let Some(hit) = product else {
-            return Some(self.missed(self.ray.tfar, oracle?));
+            return Some(self.missed(self.ray.tfar, oracle?, None));
         };
         let hit = self.refined(hit);
         let pass = self.pass(hit.prim);
@@ -85,7 +85,7 @@ impl<'a> Closely<'a> {
         } else if apart < 0.0 {
             Some(self.extra(&pass))
         } else {
-            let missed = self.missed(hit.t - pass.along() / length, true_hit);
+            let missed = self.missed(hit.t - pass.along() / length, true_hit, Some(hit.prim));
             let slipped = missed.class == Class::Missed
                 && self.is_at_vertex(true_hit.prim)
                 && self.faces(hit.prim);
@@ -142,10 +142,10 @@ impl<'a> Closely<'a> {
         (t - self.ray.tnear).abs() <= along || (t - self.ray.tfar).abs() <= along
     }
 
-    /// A hit that the product does not have although nothing nearer than `limit` was reported.
-    fn missed(&self, limit: f64, hit: Hit) -> Difference {
+    /// A hit that the product does not have although nothing nearer than `limit` was reported, where its `answer` lies.
+    fn missed(&self, limit: f64, hit: Hit, answer: Option<PrimRef>) -> Difference {
         let pass = self.pass(hit.prim);
-        let class = self.gap(limit).unwrap_or(Class::Missed);
+        let class = self.gap(limit, answer).unwrap_or(Class::Missed);
         Difference { class, ulps: pass.edge_ulps }
     }
 
@@ -173,14 +173,15 @@ impl<'a> Closely<'a> {
     pub fn leak(&self) -> Difference {
         let hits = self.check.oracle.all_hits(&self.ray);
         let clearest = hits.iter().map(|h| self.pass(h.hit.prim).edge_ulps).fold(0.0, f64::max);
-        let class = self.gap(self.ray.tfar).unwrap_or(Class::ShadowLeak);
+        let class = self.gap(self.ray.tfar, None).unwrap_or(Class::ShadowLeak);
         Difference { class, ulps: clearest }
     }
 
     /// Whether nothing before `limit` is hit for certain: by what lies at the ray's ends, where the
-    /// surface ends, or since a ray within the band passes everything by. Between triangles that share
-    /// an edge there is no such ray.
-    fn gap(&self, limit: f64) -> Option<Class> {
+    /// surface ends, or since a ray within the band passes everything by but the product's `answer`,
+    /// which it may meet long before `limit` where the ray grazes that. Between triangles that share an edge
+    /// there is no such ray.
+    fn gap(&self, limit: f64, answer: Option<PrimRef>) -> Option<Class> {
         let hits = self.check.oracle.all_hits(&self.ray);
         let nearer = hits.iter().filter(|h| h.hit.t <= limit);
         let (at_end, others): (Vec<&CourtHit>, Vec<&CourtHit>) =
@@ -194,7 +195,8 @@ impl<'a> Closely<'a> {
         if others.iter().all(|h| self.is_at_border(h.hit.prim)) {
             return Some(Class::EdgeBand);
         }
-        let near = self.near();
+        let mut near = self.near();
+        near.retain(|prim| Some(*prim) != answer);
         let width = others.iter().map(|h| self.pass(h.hit.prim).ulp).fold(0.0, f64::max);
         let free = |by: &DVec3| !near.iter().any(|prim| self.is_hit_beside(*prim, *by, limit));
         self.offsets(BAND_ULPS * width, &near).iter().any(free).then_some(Class::EdgeBand)
