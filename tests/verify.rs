@@ -284,18 +284,21 @@ fn a_ray_at_a_silhouette_may_pass_onto_a_grazed_floor() {
     let (settings, shot, oracle) = (Settings::default(), shot(), Oracle::new(&scene));
     let check = Check::new(&scene, &settings, &shot, &oracle, &oracle);
     let edge = [0, 1].map(|k| scene.meshes[0].positions[k].as_dvec3());
-    let class = |above: f64| {
-        let target = edge[0].lerp(edge[1], 0.37);
-        let dir = DVec3::new(0.01, -2e-4, -1.0);
-        let ray = Ray::new(target + DVec3::Y * above - dir, dir);
+    let dir = DVec3::new(0.01, -2e-4, -1.0);
+    let class = |target: DVec3, mesh| {
+        let ray = Ray::new(target - dir, dir);
         let hits = oracle.all_hits(&ray);
-        let behind = hits.iter().find(|h| h.hit.prim.geom_id == 1).unwrap();
-        assert_eq!(hits[0].hit.prim.geom_id, 0, "{above}");
+        assert_eq!(hits[0].hit.prim.geom_id, 0);
+        let behind = hits.iter().find(|h| h.hit.prim.geom_id == mesh && h.hit.t > 1.01).unwrap();
         let answers = Answers::Hits { product: Some(behind.hit), oracle: Some(hits[0].hit) };
         check.judge(&TracedRay { ray, answers }).unwrap().class
     };
-    assert_eq!([1e-10, 1e-8].map(class), [Class::EdgeBand; 2]);
-    assert_eq!(class(5e-6), Class::Missed);
+    let above = |y| edge[0].lerp(edge[1], 0.37) + DVec3::Y * y;
+    assert_eq!([1e-10, 1e-8].map(|y| class(above(y), 1)), [Class::EdgeBand; 2]);
+    assert_eq!(class(above(1e-6), 1), Class::Missed);
+    // Through the diagonal of the front onto the back of the bottom.
+    let diagonal = [0, 3].map(|k| scene.meshes[0].positions[k].as_dvec3());
+    assert_eq!(class(diagonal[0].lerp(diagonal[1], 1e-4), 0), Class::Missed);
 }
 
 #[test]

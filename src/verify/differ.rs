@@ -142,7 +142,7 @@ impl<'a> Closely<'a> {
         (t - self.ray.tnear).abs() <= along || (t - self.ray.tfar).abs() <= along
     }
 
-    /// A hit that the product does not have although nothing nearer than `limit` was reported, where its `answer` lies.
+    /// A hit that the product does not have: it reported `answer` at about `limit`, or nothing.
     fn missed(&self, limit: f64, hit: Hit, answer: Option<PrimRef>) -> Difference {
         let pass = self.pass(hit.prim);
         let class = self.gap(limit, answer).unwrap_or(Class::Missed);
@@ -178,9 +178,9 @@ impl<'a> Closely<'a> {
     }
 
     /// Whether nothing before `limit` is hit for certain: by what lies at the ray's ends, where the
-    /// surface ends, or since a ray within the band passes everything by but the product's `answer`,
-    /// which it may meet long before `limit` where the ray grazes that. Between triangles that share an edge
-    /// there is no such ray.
+    /// surface ends, or since a ray within the band meets nothing there but the product's `answer`, which
+    /// a grazing ray, once moved, may meet long before `limit`. Between triangles that share an edge there
+    /// is no such ray.
     fn gap(&self, limit: f64, answer: Option<PrimRef>) -> Option<Class> {
         let hits = self.check.oracle.all_hits(&self.ray);
         let nearer = hits.iter().filter(|h| h.hit.t <= limit);
@@ -195,10 +195,10 @@ impl<'a> Closely<'a> {
         if others.iter().all(|h| self.is_at_border(h.hit.prim)) {
             return Some(Class::EdgeBand);
         }
-        let mut near = self.near();
-        near.retain(|prim| Some(*prim) != answer);
+        let near = self.near();
         let width = others.iter().map(|h| self.pass(h.hit.prim).ulp).fold(0.0, f64::max);
-        let free = |by: &DVec3| !near.iter().any(|prim| self.is_hit_beside(*prim, *by, limit));
+        let bars = |prim, by| Some(prim) != answer && self.is_hit_beside(prim, by, limit);
+        let free = |by: &DVec3| !near.iter().any(|prim| bars(*prim, *by));
         self.offsets(BAND_ULPS * width, &near).iter().any(free).then_some(Class::EdgeBand)
     }
 
