@@ -86,7 +86,7 @@ impl<'a> Stand<'a> {
     }
 
     fn lookup<'l>(&'l self, frame: u32, references: &'l [&'l Reference]) -> Lookup<'l> {
-        Lookup { frame, references, channels: &self.looked_up }
+        Lookup { frame, references, channels: &self.looked_up, specular: true }
     }
 
     fn job<'j>(

@@ -271,33 +271,91 @@ pub fn could_be_worth_lookups(
     known * (cost.traced - cost.checked) > cost.lookup
 }
 
-/// Whether lookups save more than they cost, by the `findings` of probes, if those estimates are used that
-/// `evidence` allows: by more than `deviations` standard deviations that the sum of their gains would have
-/// if it were zero on average. A share `probed` of the points is probed, each of which is traced once more.
-pub fn is_worth_lookups<'f>(
-    evidence: &Evidence,
-    findings: impl Iterator<Item = &'f Finding>,
-    (scene, channels, settings): (&Scene, &Channels, &Settings),
-    (probed, deviations): (f64, f64),
-) -> bool {
-    let of_samples = |samples| PointCost::of(scene, channels, settings, samples);
-    let (direct, specular) = (of_samples(direct_samples(settings)), of_samples(1));
-    // Each point has one finding of all its lights.
-    let findings = findings.filter(|finding| !is_part(finding.level));
-    let gain = |finding: &Finding| {
-        let cost = if is_direct(finding.level) { &direct } else { &specular };
-        let saved = match (evidence.may_use(finding.level, 1.0), finding.agreed) {
-            (true, true) => cost.traced - cost.checked,
-            (true, false) => -cost.checked,
-            (false, _) => 0.0,
-        };
-        saved - probed * cost.traced - cost.lookup
-    };
-    // About zero and not about their mean: a few findings that agree may do so by chance.
-    let (sum, squares) = findings
-        .map(gain)
-        .fold((0.0, 0.0), |(sum, squares), gain| (sum + gain, squares + gain * gain));
-    sum > deviations * squares.sqrt()
+/// The points of a frame that are looked up.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum LookedUp {
+    /// None: the frame is traced whole.
+    Nothing,
+    /// Those that a pixel shows directly and in focus.
+    Direct,
+    /// Those in mirrors, through glass and out of focus too.
+    All,
+}
+
+/// What lookups of some points save: the sum over the findings at them, and the sum of the squares.
+#[derive(Debug, Clone, Copy, Default)]
+struct Gain {
+    sum: f64,
+    squares: f64,
+}
+
+impl Gain {
+    fn with(self, other: Self) -> Self {
+        Self { sum: self.sum + other.sum, squares: self.squares + other.squares }
+    }
+
+    /// Whether it is above zero by more than `deviations` of the standard deviations that it would have if lookups saved
+    /// nothing on average. About zero and not about their mean: a few findings that agree may do so by chance.
+    fn exceeds(self, deviations: f64) -> bool {
+        self.sum > deviations * self.squares.sqrt()
+    }
+}
+
+/// What lookups save, by the findings of probes, if those estimates are used that the evidence allows.
+pub struct Gains {
+    direct: Gain,
+    /// At points in mirrors, through glass and out of focus.
+    specular: Gain,
+}
+
+impl Gains {
+    /// Of `findings`, judged by `evidence`. A share `probed` of the points is probed, each of which is traced once more.
+    pub fn of<'f>(
+        evidence: &Evidence,
+        findings: impl Iterator<Item = &'f Finding>,
+        (scene, channels, settings): (&Scene, &Channels, &Settings),
+        probed: f64,
+    ) -> Self {
+        let of_samples = |samples| PointCost::of(scene, channels, settings, samples);
+        let (direct, specular) = (of_samples(direct_samples(settings)), of_samples(1));
+        let mut gains = Self { direct: Gain::default(), specular: Gain::default() };
+        // Each point has one finding of all its lights.
+        for finding in findings.filter(|finding| !is_part(finding.level)) {
+            let (cost, gain) = match is_direct(finding.level) {
+                true => (&direct, &mut gains.direct),
+                false => (&specular, &mut gains.specular),
+            };
+            let saved = match (evidence.may_use(finding.level, 1.0), finding.agreed) {
+                (true, true) => cost.traced - cost.checked,
+                (true, false) => -cost.checked,
+                (false, _) => 0.0,
+            };
+            let sum = saved - probed * cost.traced - cost.lookup;
+            *gain = gain.with(Gain { sum, squares: sum * sum });
+        }
+        gains
+    }
+
+    /// Whether lookups of all points, or of those that are seen directly, save more than they cost: by more than
+    /// `deviations` standard deviations.
+    pub fn pay(&self, deviations: f64) -> bool {
+        let all = self.direct.with(self.specular);
+        self.direct.exceeds(deviations) || all.exceeds(deviations)
+    }
+
+    /// The points to look up. Those that are not seen directly are left out if lookups of them lose by more than
+    /// `deviations` standard deviations: few findings do not tell.
+    pub fn looked_up(&self, deviations: f64) -> LookedUp {
+        let all = self.direct.with(self.specular);
+        let loss = Gain { sum: -self.specular.sum, ..self.specular };
+        if all.exceeds(0.0) && !loss.exceeds(deviations) {
+            LookedUp::All
+        } else if self.direct.exceeds(0.0) {
+            LookedUp::Direct
+        } else {
+            LookedUp::Nothing
+        }
+    }
 }
 
 #[cfg(test)]
@@ -340,12 +398,7 @@ mod tests {
         let exact = Finding { level: level as u8, agreed: true, error: 0.0, noise: 1.0 };
         let findings = vec![exact; count];
         let evidence = Evidence::of(std::iter::repeat_n(&exact, 100), 0.25);
-        is_worth_lookups(
-            &evidence,
-            findings.iter(),
-            (scene, &channels, settings),
-            (0.01, deviations),
-        )
+        Gains::of(&evidence, findings.iter(), (scene, &channels, settings), 0.01).pay(deviations)
     }
 
     #[test]
@@ -358,6 +411,39 @@ mod tests {
         let (direct, specular) = (0, 2 * STEPS);
         assert!(is_worth(direct, 16) && !is_worth(specular, 16));
         assert!(is_worth(specular, 256));
+    }
+
+    #[test]
+    fn points_in_mirrors_are_left_out_where_lookups_of_them_lose_by_more_than_chance() {
+        let scene = room(1, 0.0);
+        let settings = Settings { spp: 4, ..Settings::default() };
+        let channels = channels(&scene, &settings);
+        let exact =
+            |level: usize| Finding { level: level as u8, agreed: true, error: 0.0, noise: 1.0 };
+        // The evidence allows the first two.
+        let levels = [0, 2 * STEPS, STEPS - 1, 3 * STEPS - 1];
+        let [direct, specular, risky, risky_specular] = levels.map(exact);
+        let known = [direct, specular].into_iter().cycle().take(200).collect::<Vec<_>>();
+        let evidence = Evidence::of(known.iter(), 0.25);
+        let looked_up = |found: &[(Finding, usize)]| {
+            let each =
+                found.iter().flat_map(|(finding, count)| std::iter::repeat_n(finding, *count));
+            Gains::of(&evidence, each, (&scene, &channels, &settings), 0.0).looked_up(2.0)
+        };
+        assert_eq!(looked_up(&[]), LookedUp::Nothing);
+        assert_eq!(looked_up(&[(risky, 100)]), LookedUp::Nothing);
+        assert_eq!(looked_up(&[(specular, 100)]), LookedUp::Nothing);
+        assert_eq!(looked_up(&[(direct, 100)]), LookedUp::All);
+        // Four that lose are no proof.
+        assert_eq!(looked_up(&[(direct, 100), (specular, 4)]), LookedUp::All);
+        assert_eq!(looked_up(&[(direct, 100), (specular, 5)]), LookedUp::Direct);
+        // Where they lose more than the others gain they are left out too.
+        assert_eq!(looked_up(&[(direct, 1), (risky_specular, 4)]), LookedUp::Direct);
+        // With more rays they gain as well.
+        let settings = Settings { shadow_samples: 256, ..settings };
+        let each = [direct, specular, specular, specular, specular, specular];
+        let gains = Gains::of(&evidence, each.iter(), (&scene, &channels, &settings), 0.0);
+        assert_eq!(gains.looked_up(2.0), LookedUp::All);
     }
 
     #[test]

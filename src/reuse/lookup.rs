@@ -31,6 +31,8 @@ pub struct Lookup<'a> {
     pub references: &'a [&'a Reference],
     /// The channels of ratios, those of one light in a row.
     pub channels: &'a [LookupChannel],
+    /// Whether points in mirrors, through glass and out of focus are looked up too.
+    pub specular: bool,
 }
 
 /// A channel of ratios.
@@ -124,10 +126,12 @@ impl Lookup<'_> {
                 own.and_then(|own| own.get(..channels)).unwrap_or_default()
             };
             let shown = |i: usize| &unshadowed[i * channels..][..channels];
-            let is_lit = |i: usize| shown(i).iter().any(|s| *s != 0.0);
+            let is_asked = |i: usize| {
+                (self.specular || points[i].direct) && shown(i).iter().any(|s| *s != 0.0)
+            };
             let mut found: [[Option<Taps4>; ALWAYS]; TOGETHER] = [[None; ALWAYS]; TOGETHER];
-            references.find(points, is_lit, &mut found);
-            for (i, point) in points.iter().enumerate().filter(|(i, _)| is_lit(*i)) {
+            references.find(points, is_asked, &mut found);
+            for (i, point) in points.iter().enumerate().filter(|(i, _)| is_asked(*i)) {
                 references.gather(point, &found[i], &mut taps);
                 if taps.weight >= LEAST_WEIGHT {
                     let own = &mut estimates[i * channels..][..channels];

@@ -22,7 +22,7 @@ pub mod store;
 mod taps;
 
 pub use cost::{
-    LookupReason, channels, could_be_worth_lookups, is_worth_lookups, lookup_reasons, of_frame,
+    Gains, LookedUp, LookupReason, channels, could_be_worth_lookups, lookup_reasons, of_frame,
 };
 pub use lookup::{Judged, Lookup, LookupChannel};
 pub use probe::{PARTS, Probe, ProbeDraw};

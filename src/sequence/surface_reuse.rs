@@ -16,7 +16,7 @@ use crate::inference::{Channels, Inference, TracedPoints};
 use crate::output::WriteOptions;
 use crate::reuse::evidence::ProbeFindings;
 use crate::reuse::store::{Compatibility, ReferenceRecord};
-use crate::reuse::{self, Judged, Lookup, LookupChannel, Reference};
+use crate::reuse::{self, Judged, LookedUp, Lookup, LookupChannel, Reference};
 use crate::scene::{Camera, Rect};
 use crate::shade::{FrameJob, Progress, Rendered, Reuse};
 use probing::Probing;
@@ -138,10 +138,11 @@ impl<'a> SurfaceReuse<'a> {
         let beyond_crop = is_due && !is_given_up;
         let is_source = !is_given_up && (is_due || self.terms.is_some());
         let job = FrameJob { mask, known, beyond_crop, ..self.context.job(frame, &camera) };
-        let Some(probed) = probed.filter(|probed| probed.is_worth_lookups) else {
+        let Some(probed) = probed.filter(|probed| probed.looked_up != LookedUp::Nothing) else {
             return self.render(job, is_source, None, progress);
         };
         self.with_lookup((frame, &camera), &references, |lookup| {
+            let lookup = lookup.map(|lookup| probed.limited(lookup));
             let evidence = |_| &probed.evidence;
             let tolerance = self.context.renderer.settings.reuse.tolerance;
             let judged =
@@ -189,7 +190,7 @@ impl<'a> SurfaceReuse<'a> {
         let references = with_supplied(references, &supplied);
         let settings = self.context.renderer.settings;
         let channels = LookupChannel::all(&self.channels, settings);
-        let lookup = Lookup { frame, references: &references, channels: &channels };
+        let lookup = Lookup { frame, references: &references, channels: &channels, specular: true };
         act((!references.is_empty()).then_some(lookup))
     }
 

@@ -49,7 +49,7 @@ fn wall(ratio: impl Fn(u32) -> f32) -> Reference {
 
 /// The estimate from `reference` for `point`, whose light has the radiance 1 without shadows.
 fn estimated(reference: &Reference, point: SurfacePoint) -> Estimate {
-    let lookup = Lookup { frame: 2, references: &[reference], channels: &[LIGHT] };
+    let lookup = Lookup { frame: 2, references: &[reference], channels: &[LIGHT], specular: true };
     let mut asked = LookupBatch {
         points: vec![point],
         pixels: vec![[0; 2]],
@@ -227,7 +227,8 @@ fn asked_at(x: f64, unshadowed: [f32; 3]) -> LookupBatch {
 #[test]
 fn lights_are_ordered_by_what_they_send() {
     let reference = wall_with_an_edge();
-    let lookup = Lookup { frame: 2, references: &[&reference], channels: &[LIGHT; 3] };
+    let lookup =
+        Lookup { frame: 2, references: &[&reference], channels: &[LIGHT; 3], specular: true };
     let of = |x: f64, second: f32| {
         let mut asked = asked_at(x, [1.0, second, 1.0]);
         lookup.estimate(&mut asked);
@@ -269,7 +270,8 @@ fn only_the_brighter_lights_are_traced() {
     let none = Evidence::of(wrong.iter(), 0.25);
     let answers = |evidence: &Evidence, x: f64, rays: u32| {
         let channels = [LookupChannel { rays, ..LIGHT }; 3];
-        let lookup = Lookup { frame: 2, references: &[&reference], channels: &channels };
+        let lookup =
+            Lookup { frame: 2, references: &[&reference], channels: &channels, specular: true };
         let mut asked = asked_at(x, [0.1, 0.2, 0.1]);
         let judge = |_| evidence;
         Judged { lookup: &lookup, evidence: &judge, tolerance: 0.25 }.infer(&mut asked);

@@ -15,7 +15,7 @@ use crate::output::Display;
 use crate::reuse::audit::{self, AuditedFrame, AuditedPixel};
 use crate::reuse::evidence::{Evidence, Finding, ProbeFindings};
 use crate::reuse::{
-    Judged, Lookup, PARTS, Probe, ProbeDraw, Reference, could_be_worth_lookups, is_worth_lookups,
+    Gains, Judged, LookedUp, Lookup, PARTS, Probe, ProbeDraw, Reference, could_be_worth_lookups,
 };
 use crate::scene::Camera;
 use crate::shade::{FrameJob, Known, Rendered, Sampling};
@@ -48,7 +48,7 @@ const LEAST_KNOWN: f64 = 0.9;
 /// them shall not decide.
 const TIMES: f64 = 8.0;
 /// A reference frame counts as one in which lookups pay only if its gain is more than this many standard deviations above zero: a few
-/// lucky findings shall not keep others from being given up.
+/// lucky findings shall not keep others from being given up. Points that are not seen directly are not looked up if that loses by as many.
 const DOUBT: f64 = 2.0;
 
 /// What probes decide for a frame.
@@ -89,14 +89,19 @@ pub(super) struct Probed {
     pub evidence: Evidence,
     /// For each part of the probes the evidence from the findings of the other parts.
     crossed: Vec<Evidence>,
-    /// Whether lookups save more than they cost.
-    pub is_worth_lookups: bool,
+    /// The points whose lookups save more than they cost.
+    pub looked_up: LookedUp,
 }
 
 impl Probed {
     /// What the probes show: their first trace.
     pub fn shown(&self) -> Known<'_> {
         Known { mask: &self.mask, rendered: &self.traces[0] }
+    }
+
+    /// `lookup` for those points alone whose lookups pay.
+    pub fn limited<'l>(&self, lookup: Lookup<'l>) -> Lookup<'l> {
+        Lookup { specular: self.looked_up == LookedUp::All, ..lookup }
     }
 
     /// The camera samples of the probes.
@@ -130,7 +135,7 @@ impl SurfaceReuse<'_> {
         let findings = probed.iter().flat_map(|found| &found.list);
         let evidence = Evidence::counted(findings, TIMES, r.settings.reuse.tolerance);
         let cast = (r.scene, &self.channels, r.settings);
-        let pays = |list: &[Finding]| is_worth_lookups(&evidence, list.iter(), cast, (0.0, DOUBT));
+        let pays = |list: &[Finding]| Gains::of(&evidence, list.iter(), cast, 0.0).pay(DOUBT);
         !probed.iter().any(|found| pays(&found.list))
     }
 
@@ -143,8 +148,8 @@ impl SurfaceReuse<'_> {
         let known = lookup.references.iter().filter(|r| !r.findings().list.is_empty()).count();
         let pixels = f64::from(camera.width) * f64::from(camera.height);
         let usual = f64::from(r.settings.reuse.probes) * (LEAST / pixels).max(1.0);
-        let is_worth = |known: &Evidence| is_worth_lookups(known, before(), cast, (usual, 0.0));
-        let is_hopeless = known > 0 && !is_worth(&Evidence::of(before(), tolerance));
+        let pay = |known: &Evidence| Gains::of(known, before(), cast, usual).pay(0.0);
+        let is_hopeless = known > 0 && !pay(&Evidence::of(before(), tolerance));
         // In mirrors and glass the footprint of a pixel is computed from neighbouring pixels.
         let block = if r.plan().mirror || r.plan().glass { 2 } else { 1 };
         let trace = |mask: &[bool], stream: u32, lookup, sampling| {
@@ -195,8 +200,9 @@ impl SurfaceReuse<'_> {
         let own: &[Finding] = &findings.list;
         let evidence = Evidence::of(before().chain(own), tolerance);
         // The frame's own probes are traced in any case, so they cost nothing more.
-        let is_worth_lookups =
-            could_be(&findings) && is_worth_lookups(&evidence, own.iter(), cast, (0.0, 0.0));
+        let gains = Gains::of(&evidence, own.iter(), cast, 0.0);
+        let looked_up =
+            if could_be(&findings) { gains.looked_up(DOUBT) } else { LookedUp::Nothing };
         Ok(Probed {
             draw,
             mask,
@@ -206,7 +212,7 @@ impl SurfaceReuse<'_> {
             findings,
             evidence,
             crossed,
-            is_worth_lookups,
+            looked_up,
         })
     }
 
@@ -279,6 +285,7 @@ impl SurfaceReuse<'_> {
     ) -> Result<(RayCounts, Option<Film>)> {
         self.with_lookup((frame, camera), references, |lookup| {
             let Some(lookup) = lookup else { return Ok((RayCounts::default(), None)) };
+            let lookup = probed.limited(lookup);
             let evidence = |[x, y]: [u32; 2]| &probed.crossed[probed.draw.part(x, y)];
             let tolerance = self.context.renderer.settings.reuse.tolerance;
             let judged = Judged { lookup: &lookup, evidence: &evidence, tolerance };
