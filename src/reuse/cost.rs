@@ -276,9 +276,9 @@ pub fn could_be_worth_lookups(
 pub enum LookedUp {
     /// None: the frame is traced whole.
     Nothing,
-    /// Those that a pixel shows directly and in focus.
+    /// Those that a pixel shows directly.
     Direct,
-    /// Those in mirrors, through glass and out of focus too.
+    /// Those in mirrors and through glass too.
     All,
 }
 
@@ -299,56 +299,61 @@ impl Gain {
     fn exceeds(self, deviations: f64) -> bool {
         self.sum > deviations * self.squares.sqrt()
     }
+
+    /// Whether it is below zero by more than as many.
+    fn falls_below(self, deviations: f64) -> bool {
+        self.sum < -deviations * self.squares.sqrt()
+    }
 }
 
 /// What lookups save, by the findings of probes, if those estimates are used that the evidence allows.
 pub struct Gains {
     direct: Gain,
-    /// At points in mirrors, through glass and out of focus.
+    /// At points in mirrors and through glass.
     specular: Gain,
 }
 
 impl Gains {
-    /// Of `findings`, judged by `evidence`. A share `probed` of the points is probed, each of which is traced once more.
+    /// Of `findings`, judged by `evidence`. A share `probed` of the points is probed, each of which is traced once more. For
+    /// each point in mirrors and through glass that has an estimate, `unknown` have none.
     pub fn of<'f>(
         evidence: &Evidence,
         findings: impl Iterator<Item = &'f Finding>,
         (scene, channels, settings): (&Scene, &Channels, &Settings),
-        probed: f64,
+        (probed, unknown): (f64, f64),
     ) -> Self {
         let of_samples = |samples| PointCost::of(scene, channels, settings, samples);
         let (direct, specular) = (of_samples(direct_samples(settings)), of_samples(1));
         let mut gains = Self { direct: Gain::default(), specular: Gain::default() };
         // Each point has one finding of all its lights.
         for finding in findings.filter(|finding| !is_part(finding.level)) {
-            let (cost, gain) = match is_direct(finding.level) {
-                true => (&direct, &mut gains.direct),
-                false => (&specular, &mut gains.specular),
+            let (cost, gain, unknown) = match is_direct(finding.level) {
+                true => (&direct, &mut gains.direct, 0.0),
+                false => (&specular, &mut gains.specular, unknown),
             };
             let saved = match (evidence.may_use(finding.level, 1.0), finding.agreed) {
                 (true, true) => cost.traced - cost.checked,
                 (true, false) => -cost.checked,
                 (false, _) => 0.0,
             };
-            let sum = saved - probed * cost.traced - cost.lookup;
+            let sum = saved - probed * cost.traced - cost.lookup - unknown * LOOKUP;
             *gain = gain.with(Gain { sum, squares: sum * sum });
         }
         gains
     }
 
-    /// Whether lookups of all points, or of those that are seen directly, save more than they cost: by more than
+    /// Whether lookups of all points, or of those alone that are seen directly, save more than they cost: by more than
     /// `deviations` standard deviations.
     pub fn pay(&self, deviations: f64) -> bool {
         let all = self.direct.with(self.specular);
         self.direct.exceeds(deviations) || all.exceeds(deviations)
     }
 
-    /// The points to look up. Those that are not seen directly are left out if lookups of them lose by more than
-    /// `deviations` standard deviations: few findings do not tell.
+    /// The points to look up. Those in mirrors and through glass are left out if lookups of them lose more than the others
+    /// gain, or lose by more than `deviations` standard deviations: few findings do not tell.
     pub fn looked_up(&self, deviations: f64) -> LookedUp {
         let all = self.direct.with(self.specular);
-        let loss = Gain { sum: -self.specular.sum, ..self.specular };
-        if all.exceeds(0.0) && !loss.exceeds(deviations) {
+        if all.exceeds(0.0) && !self.specular.falls_below(deviations) {
             LookedUp::All
         } else if self.direct.exceeds(0.0) {
             LookedUp::Direct
@@ -398,7 +403,8 @@ mod tests {
         let exact = Finding { level: level as u8, agreed: true, error: 0.0, noise: 1.0 };
         let findings = vec![exact; count];
         let evidence = Evidence::of(std::iter::repeat_n(&exact, 100), 0.25);
-        Gains::of(&evidence, findings.iter(), (scene, &channels, settings), 0.01).pay(deviations)
+        Gains::of(&evidence, findings.iter(), (scene, &channels, settings), (0.01, 0.0))
+            .pay(deviations)
     }
 
     #[test]
@@ -428,7 +434,7 @@ mod tests {
         let looked_up = |found: &[(Finding, usize)]| {
             let each =
                 found.iter().flat_map(|(finding, count)| std::iter::repeat_n(finding, *count));
-            Gains::of(&evidence, each, (&scene, &channels, &settings), 0.0).looked_up(2.0)
+            Gains::of(&evidence, each, (&scene, &channels, &settings), (0.0, 0.0)).looked_up(2.0)
         };
         assert_eq!(looked_up(&[]), LookedUp::Nothing);
         assert_eq!(looked_up(&[(risky, 100)]), LookedUp::Nothing);
@@ -442,8 +448,13 @@ mod tests {
         // With more rays they gain as well.
         let settings = Settings { shadow_samples: 256, ..settings };
         let each = [direct, specular, specular, specular, specular, specular];
-        let gains = Gains::of(&evidence, each.iter(), (&scene, &channels, &settings), 0.0);
-        assert_eq!(gains.looked_up(2.0), LookedUp::All);
+        let looked_up = |unknown| {
+            let cast = (&scene, &channels, &settings);
+            Gains::of(&evidence, each.iter(), cast, (0.0, unknown)).looked_up(2.0)
+        };
+        assert_eq!(looked_up(0.0), LookedUp::All);
+        // Unless most lookups find nothing.
+        assert_eq!(looked_up(99.0), LookedUp::Direct);
     }
 
     #[test]

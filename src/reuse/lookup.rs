@@ -31,7 +31,7 @@ pub struct Lookup<'a> {
     pub references: &'a [&'a Reference],
     /// The channels of ratios, those of one light in a row.
     pub channels: &'a [LookupChannel],
-    /// Whether points in mirrors, through glass and out of focus are looked up too.
+    /// Whether points in mirrors and through glass are looked up too.
     pub specular: bool,
 }
 

@@ -118,11 +118,14 @@ impl<'a> Probe<'a> {
         notes
     }
 
-    /// How many of the recorded points a light may reach, and how many of these have an estimate of one.
-    pub fn lit_and_known(&self) -> (u64, u64) {
+    /// How many of the recorded points that a pixel shows directly, or of the others, a light may reach, and how many of
+    /// these have an estimate of one.
+    pub fn lit_and_known(&self, direct: bool) -> (u64, u64) {
         let notes = self.notes.lock().unwrap_or_else(PoisonError::into_inner);
         let is_lit = |light: &&LightComparison| light.unshadowed != 0.0;
-        let lit = notes.iter().filter(|note| note.lights.iter().any(|light| is_lit(&light)));
+        let lit = notes.iter().filter(|note| {
+            note.point.direct == direct && note.lights.iter().any(|light| is_lit(&light))
+        });
         let is_known = |note: &&Note| {
             note.lights.iter().filter(is_lit).any(|light| !light.estimate.ratio.is_nan())
         };

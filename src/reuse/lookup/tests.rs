@@ -49,7 +49,12 @@ fn wall(ratio: impl Fn(u32) -> f32) -> Reference {
 
 /// The estimate from `reference` for `point`, whose light has the radiance 1 without shadows.
 fn estimated(reference: &Reference, point: SurfacePoint) -> Estimate {
-    let lookup = Lookup { frame: 2, references: &[reference], channels: &[LIGHT], specular: true };
+    estimated_by(true, reference, point)
+}
+
+/// The same where points that are not seen directly may be left out.
+fn estimated_by(specular: bool, reference: &Reference, point: SurfacePoint) -> Estimate {
+    let lookup = Lookup { frame: 2, references: &[reference], channels: &[LIGHT], specular };
     let mut asked = LookupBatch {
         points: vec![point],
         pixels: vec![[0; 2]],
@@ -83,6 +88,16 @@ fn samples_on_the_surface_give_an_exact_estimate() {
     for point in [on_wall(30.5, 20.5), on_wall(11.13, 47.9), on_wall(0.2, 0.1), lifted(0.5)] {
         assert_eq!(told(&reference, point), 0.25);
     }
+}
+
+#[test]
+fn points_that_are_not_seen_directly_may_be_left_out() {
+    let reference = wall(|_| 0.25);
+    let direct = on_wall(30.5, 20.5);
+    let specular = SurfacePoint { direct: false, ..direct };
+    let known = |is_asked, point| estimated_by(is_asked, &reference, point).ratio;
+    assert_eq!([known(true, direct), known(true, specular), known(false, direct)], [0.25; 3]);
+    assert!(known(false, specular).is_nan());
 }
 
 #[test]

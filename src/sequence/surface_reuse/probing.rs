@@ -48,7 +48,8 @@ const LEAST_KNOWN: f64 = 0.9;
 /// them shall not decide.
 const TIMES: f64 = 8.0;
 /// A reference frame counts as one in which lookups pay only if its gain is more than this many standard deviations above zero: a few
-/// lucky findings shall not keep others from being given up. Points that are not seen directly are not looked up if that loses by as many.
+/// lucky findings shall not keep others from being given up. Points in mirrors and through glass are not looked up if lookups of them lose by more
+/// than this many.
 const DOUBT: f64 = 2.0;
 
 /// What probes decide for a frame.
@@ -89,7 +90,7 @@ pub(super) struct Probed {
     pub evidence: Evidence,
     /// For each part of the probes the evidence from the findings of the other parts.
     crossed: Vec<Evidence>,
-    /// The points whose lookups save more than they cost.
+    /// The points that are looked up in the frame.
     pub looked_up: LookedUp,
 }
 
@@ -99,7 +100,7 @@ impl Probed {
         Known { mask: &self.mask, rendered: &self.traces[0] }
     }
 
-    /// `lookup` for those points alone whose lookups pay.
+    /// `lookup`, limited to the points that are looked up in the frame.
     pub fn limited<'l>(&self, lookup: Lookup<'l>) -> Lookup<'l> {
         Lookup { specular: self.looked_up == LookedUp::All, ..lookup }
     }
@@ -135,7 +136,8 @@ impl SurfaceReuse<'_> {
         let findings = probed.iter().flat_map(|found| &found.list);
         let evidence = Evidence::counted(findings, TIMES, r.settings.reuse.tolerance);
         let cast = (r.scene, &self.channels, r.settings);
-        let pays = |list: &[Finding]| Gains::of(&evidence, list.iter(), cast, 0.0).pay(DOUBT);
+        let pays =
+            |list: &[Finding]| Gains::of(&evidence, list.iter(), cast, (0.0, 0.0)).pay(DOUBT);
         !probed.iter().any(|found| pays(&found.list))
     }
 
@@ -148,7 +150,7 @@ impl SurfaceReuse<'_> {
         let known = lookup.references.iter().filter(|r| !r.findings().list.is_empty()).count();
         let pixels = f64::from(camera.width) * f64::from(camera.height);
         let usual = f64::from(r.settings.reuse.probes) * (LEAST / pixels).max(1.0);
-        let pay = |known: &Evidence| Gains::of(known, before(), cast, usual).pay(0.0);
+        let pay = |known: &Evidence| Gains::of(known, before(), cast, (usual, 0.0)).pay(0.0);
         let is_hopeless = known > 0 && !pay(&Evidence::of(before(), tolerance));
         // In mirrors and glass the footprint of a pixel is computed from neighbouring pixels.
         let block = if r.plan().mirror || r.plan().glass { 2 } else { 1 };
@@ -167,11 +169,22 @@ impl SurfaceReuse<'_> {
             let (rendered, probe) = trace(&mask, STREAMS[0], Some(lookup), Sampling::Own)?;
             Result::Ok((draw, mask, rendered, probe))
         };
+        // Points that are seen directly, and others.
         let seen = |probe: &Probe| {
-            let (lit, known) = probe.lit_and_known();
-            ProbeFindings { list: Vec::new(), lit, known }
+            [true, false].map(|direct| {
+                let (lit, known) = probe.lit_and_known(direct);
+                ProbeFindings { list: Vec::new(), lit, known }
+            })
         };
-        let could_be = |seen: &ProbeFindings| could_be_worth_lookups(seen.known_share(), cast);
+        let total = |[a, b]: &[ProbeFindings; 2]| ProbeFindings {
+            list: Vec::new(),
+            lit: a.lit + b.lit,
+            known: a.known + b.known,
+        };
+        let could_be = |seen: &[ProbeFindings; 2]| {
+            let shares = [&seen[0], &total(seen)].map(ProbeFindings::known_share);
+            shares.iter().any(|known| could_be_worth_lookups(*known, cast))
+        };
         let usually = MULTIPLES[known.min(MULTIPLES.len() - 1)];
         let multiple = if is_hopeless { HOPELESS } else { usually };
         let (mut draw, mut mask, mut first, mut own) = estimated(multiple)?;
@@ -187,7 +200,8 @@ impl SurfaceReuse<'_> {
         let samples = |[x, y]: [u32; 2]| {
             counts.get(first.film.index(x, y)).copied().unwrap_or(r.settings.spp)
         };
-        let mut findings = seen(&own);
+        let seen = seen(&own);
+        let mut findings = total(&seen);
         let found = own.findings(again, r.settings.spp, &samples);
         let of_others = |part: usize| {
             let is_in = move |pixel: &[u32; 2]| draw.part(pixel[0], pixel[1]) == part;
@@ -200,9 +214,9 @@ impl SurfaceReuse<'_> {
         let own: &[Finding] = &findings.list;
         let evidence = Evidence::of(before().chain(own), tolerance);
         // The frame's own probes are traced in any case, so they cost nothing more.
-        let gains = Gains::of(&evidence, own.iter(), cast, 0.0);
-        let looked_up =
-            if could_be(&findings) { gains.looked_up(DOUBT) } else { LookedUp::Nothing };
+        let unknown = (seen[1].lit - seen[1].known) as f64 / seen[1].known.max(1) as f64;
+        let gains = Gains::of(&evidence, own.iter(), cast, (0.0, unknown));
+        let looked_up = if could_be(&seen) { gains.looked_up(DOUBT) } else { LookedUp::Nothing };
         Ok(Probed {
             draw,
             mask,
