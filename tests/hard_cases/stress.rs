@@ -52,7 +52,10 @@ const OF_ISA: [&str; 2] = ["a", "b"];
 
 /// Whether `name` picks a case of `letter`.
 fn picks(name: &str, letter: &str, case: &Case) -> bool {
-    name == letter || name == case.number.to_string() || case.name.contains(name)
+    match LETTERS.iter().any(|(l, ..)| *l == name) {
+        true => name == letter,
+        false => name == case.number.to_string() || case.name.contains(name),
+    }
 }
 
 fn main() {
