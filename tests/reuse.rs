@@ -81,14 +81,16 @@ fn is_no_worse_than_traced_after(
         }
     }
     assert!(worse.is_empty(), "{scene}: frames {worse:?} are worse than traced");
-    let counts = total(&made[1..SEGMENT as usize]);
-    let share = |part: u64, all: u64| if all == 0 { 1.0 } else { part as f64 / all as f64 };
-    let shares = [
-        share(counts.direct_inferred, counts.direct),
-        share(counts.specular_inferred, counts.specular),
-    ];
+    let shares = shares_inferred(&made);
     println!("{scene}: {:.3} of direct points inferred, {:.3} of others", shares[0], shares[1]);
     assert!(shares[0] >= direct && shares[1] >= specular, "{shares:?}");
+}
+
+/// The shares of the points seen directly and in mirror or glass that are inferred between the first two key frames.
+fn shares_inferred(made: &[Made]) -> [f64; 2] {
+    let counts = total(&made[1..SEGMENT as usize]);
+    let share = |part: u64, all: u64| if all == 0 { 1.0 } else { part as f64 / all as f64 };
+    [share(counts.direct_inferred, counts.direct), share(counts.specular_inferred, counts.specular)]
 }
 
 #[test]
@@ -107,9 +109,20 @@ fn reflective_spheres_is_no_worse_than_traced() {
     is_no_worse_than_traced("reflective_spheres", [0.85, 0.3]);
 }
 
+/// In frames as small as these lookups in glass lose here and there, and are left out.
 #[test]
 fn demo_is_no_worse_than_traced() {
-    is_no_worse_than_traced("demo", [0.6, 0.11]);
+    is_no_worse_than_traced("demo", [0.6, 0.07]);
+}
+
+/// Larger frames have more probes, so lookups in glass pay.
+#[test]
+fn larger_frames_of_demo_infer_more() {
+    let set = Set::load("demo", |_| ());
+    let settings = with_segment(set.settings((320, 180), 1, 16));
+    let made = set.stage(2).frames(&settings, &set.shot(FRAMES), &segment());
+    let shares = shares_inferred(&made);
+    assert!(shares[0] >= 0.85 && shares[1] >= 0.25, "{shares:?}");
 }
 
 #[test]
