@@ -315,7 +315,8 @@ pub struct Gains {
 
 impl Gains {
     /// Of `findings`, judged by `evidence`. A share `probed` of the points is probed, each of which is traced once more. For
-    /// each point in mirrors and through glass that has an estimate, `unknown` have none.
+    /// each point in mirrors and through glass that has an estimate, `unknown` have none. Where pixels have one camera sample
+    /// all points count as seen directly.
     pub fn of<'f>(
         evidence: &Evidence,
         findings: impl Iterator<Item = &'f Finding>,
@@ -325,9 +326,11 @@ impl Gains {
         let of_samples = |samples| PointCost::of(scene, channels, settings, samples);
         let (direct, specular) = (of_samples(direct_samples(settings)), of_samples(1));
         let mut gains = Self { direct: Gain::default(), specular: Gain::default() };
+        // With one camera sample a lookup saves as much in mirrors and glass: all points are judged together.
+        let is_apart = direct_samples(settings) > 1;
         // Each point has one finding of all its lights.
         for finding in findings.filter(|finding| !is_part(finding.level)) {
-            let (cost, gain, unknown) = match is_direct(finding.level) {
+            let (cost, gain, unknown) = match is_direct(finding.level) || !is_apart {
                 true => (&direct, &mut gains.direct, 0.0),
                 false => (&specular, &mut gains.specular, unknown),
             };
