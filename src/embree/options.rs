@@ -30,6 +30,19 @@ pub enum Quality {
 }
 
 impl BuildOptions<'_> {
+    /// Whether Embree's code has fused multiply-add, one rounding instead of two: on x86 that for AVX2 and
+    /// AVX-512 has.
+    pub fn fuses(&self) -> bool {
+        #[cfg(target_arch = "x86_64")]
+        let best = is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma");
+        #[cfg(not(target_arch = "x86_64"))]
+        let best = true;
+        match self.isa {
+            Some(isa) => !cfg!(target_arch = "x86_64") || matches!(isa, "avx2" | "avx512"),
+            None => best,
+        }
+    }
+
     pub(super) fn flags(&self) -> sys::RTCSceneFlags {
         let flag = |is_set, flag| if is_set { flag } else { sys::RTC_SCENE_FLAG_NONE };
         flag(self.robust, sys::RTC_SCENE_FLAG_ROBUST)

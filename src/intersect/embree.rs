@@ -8,7 +8,8 @@
 //! * Of coincident primitives the lowest `(geom_id, prim_id)` is hit.
 //! * A ray that misses although it comes near some triangle (other than the backs of a closed mesh
 //!   that it leaves) is tried again, turned by 4 ulp to one side and then to the other; and so is one
-//!   that must have missed something before its hit.
+//!   that must have missed something before its hit. Where Embree has no fused multiply-add, its errors
+//!   are larger: there such a ray is also traced from where it enters the boxes of a coarse tree.
 //!
 //! Shadow rays report no primitive: of these, only validation and coincidence reach them.
 //!
@@ -33,6 +34,7 @@ use crate::error::Result;
 use crate::math::{Bounds3, DVec3, orthonormal_basis};
 use crate::scene::{BuildQuality, HitRules, Mesh, Scene, Settings};
 use crate::stats::{RayCounts, RayKind};
+use recheck::Located;
 
 /// Half an ulp at 1 in f32.
 const ROUNDING: f64 = 1.0 / (1u64 << 24) as f64;
@@ -56,6 +58,9 @@ pub struct EmbreeIntersector<'s> {
     /// Where a miss deserves a second try; spheres need none, since their test is exact. Empty where
     /// nothing is tried twice.
     coarse: CoarseTree,
+    /// Whether what both turns leave in doubt is also traced from the boxes of `coarse`: where Embree rounds
+    /// products and sums apart.
+    searches: bool,
     meshes: Vec<MeshFacts>,
     bounds: Bounds3,
     /// Whether anything in the scene has cut-outs.
@@ -148,7 +153,8 @@ impl<'s> EmbreeIntersector<'s> {
         let Bounds3 { min, max } = scene.bounds;
         let bounds = Bounds3 { min: min - margin, max: max + margin };
         let committed = builder.commit()?;
-        Ok(Self { committed, scene, rules, near, coarse, meshes, bounds, has_holes })
+        let searches = !options.fuses();
+        Ok(Self { committed, scene, rules, near, coarse, searches, meshes, bounds, has_holes })
     }
 
     /// Whether the ray's f32 origin would be too coarse.
@@ -195,11 +201,21 @@ impl<'s> EmbreeIntersector<'s> {
     /// One Embree query that cannot hit the `passed` primitives.
     fn query(&self, ray: &Ray, turn: Turn, passed: &[PrimRef]) -> Option<Candidate> {
         let (moved, shift) = self.approach(ray)?;
-        let moved = self.nudged(&moved, shift, turn);
+        self.query_as(ray, &self.nudged(&moved, shift, turn), shift, passed)
+    }
+
+    /// [`Self::query`] of `ray` as Embree shall see it: `moved` by `shift` along it.
+    fn query_as(
+        &self,
+        ray: &Ray,
+        moved: &Ray,
+        shift: f64,
+        passed: &[PrimRef],
+    ) -> Option<Candidate> {
         let mut packet = Packet::<1>::new();
-        packet.set(0, &moved);
+        packet.set(0, moved);
         let exclude = moved.exclude != PrimRef::NONE;
-        let cast = CastRays::moved(std::slice::from_ref(&moved), std::slice::from_ref(ray));
+        let cast = CastRays::moved(std::slice::from_ref(moved), std::slice::from_ref(ray));
         let flags = QueryFlags { coherent: false, exclude, passed };
         self.committed.intersect(&[-1], &mut packet, cast, flags);
         packet.hit(0).map(|hit| Candidate { hit, shift })
@@ -212,14 +228,16 @@ impl<'s> EmbreeIntersector<'s> {
         };
         let hit = self.recheck(ray, &candidate);
         if self.retries() && self.is_doubtful(ray, &candidate.hit) {
-            for turn in TURNS {
+            let (prim, until) = (candidate.hit.prim, hit.map(|hit| hit.t));
+            let turned = TURNS.into_iter().find_map(|turn| {
                 counts[RayKind::Retry] += 1;
-                let again = self.query(ray, turn, &[]);
-                let again = again.filter(|again| again.hit.prim != candidate.hit.prim);
-                let again = again.and_then(|again| self.locate(ray, &again));
-                if let Some(again) = again.filter(|again| again.lies_before(hit.map(|h| h.t))) {
-                    return Some(again.hit);
-                }
+                let again = self.query(ray, turn, &[]).filter(|again| again.hit.prim != prim)?;
+                let again = self.locate(ray, &again)?;
+                again.lies_before(until).then_some(again.hit)
+            });
+            let nearer = turned.or_else(|| self.search(ray, &[prim], until, counts));
+            if nearer.is_some() {
+                return nearer;
             }
         }
         hit.or_else(|| self.settle(ray, Some(candidate.hit.prim), counts))
@@ -245,12 +263,13 @@ impl<'s> EmbreeIntersector<'s> {
     }
 
     /// The first true hit of `ray`, turned by a second try or not.
-    fn pursue(&self, ray: &Ray, turn: Turn, passed: &mut Vec<PrimRef>) -> Option<Hit> {
+    fn pursue(&self, ray: &Ray, turn: Turn, passed: &mut Vec<PrimRef>) -> Option<Located> {
         while passed.len() < MOST_PHANTOMS {
             let candidate = self.query(ray, turn, passed)?;
             // Judged by the ray that was asked for: the nudge is smaller than the tolerance.
-            if let Some(hit) = self.recheck(ray, &candidate) {
-                return Some(hit);
+            let located = self.locate(ray, &candidate);
+            if located.is_some() {
+                return located;
             }
             passed.push(candidate.hit.prim);
         }
@@ -260,21 +279,45 @@ impl<'s> EmbreeIntersector<'s> {
     /// The hit of a ray whose first query gave the phantom `phantom`, or nothing.
     #[cold]
     fn settle(&self, ray: &Ray, phantom: Option<PrimRef>, counts: &mut RayCounts) -> Option<Hit> {
-        let mut passed = Vec::new();
-        if let Some(phantom) = phantom {
-            passed.push(phantom);
-            let hit = self.pursue(ray, Turn::None, &mut passed);
-            if hit.is_some() {
-                return hit;
-            }
+        let mut passed = Vec::from_iter(phantom);
+        let behind = phantom.and_then(|_| self.pursue(ray, Turn::None, &mut passed));
+        let behind = behind.map(|behind| behind.hit);
+        // Embree hit the phantom in place of a triangle beside it: what lies behind is in doubt too.
+        if !self.retries() || (behind.is_none() && !self.coarse.may_meet(&Bundle::of([ray])?)) {
+            return behind;
         }
-        let bundle = Bundle::of([ray])?;
-        if !self.retries() || !self.coarse.may_meet(&bundle) {
+        let until = behind.map(|behind| behind.t);
+        passed.extend(behind.map(|behind| behind.prim));
+        let before = Ray { tfar: until.unwrap_or(ray.tfar), ..*ray };
+        let turned = TURNS.into_iter().find_map(|turn| {
+            counts[RayKind::Retry] += 1;
+            let again = self.pursue(&before, turn, &mut passed)?;
+            again.lies_before(until).then_some(again.hit)
+        });
+        turned.or_else(|| self.search(ray, &passed, until, counts)).or(behind)
+    }
+
+    /// What the ray meets before `until`, traced from where it enters the boxes of the coarse tree:
+    /// Embree's errors grow with the distance from the origin. It cannot hit the `passed` primitives.
+    #[cold]
+    fn search(
+        &self,
+        ray: &Ray,
+        passed: &[PrimRef],
+        until: Option<f64>,
+        counts: &mut RayCounts,
+    ) -> Option<Hit> {
+        if !self.searches {
             return None;
         }
-        TURNS.into_iter().find_map(|turn| {
+        let ray = Ray { tfar: until.unwrap_or(ray.tfar), ..*ray };
+        self.coarse.entries(&ray).find_map(|start| {
             counts[RayKind::Retry] += 1;
-            self.pursue(ray, turn, &mut passed)
+            let (tnear, tfar) = (ray.tnear - start, ray.tfar - start);
+            let moved = Ray { org: ray.at(start), tnear, tfar, ..ray };
+            let again = self.query_as(&ray, &moved, start, passed)?;
+            let again = self.locate(&ray, &again)?;
+            again.lies_before(until).then_some(again.hit)
         })
     }
 }

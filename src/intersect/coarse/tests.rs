@@ -56,3 +56,30 @@ fn a_ray_that_leaves_a_closed_mesh_meets_only_other_meshes() {
         assert!(may_meet([vec![own(true)], both.into()].concat(), dir), "{dir}");
     }
 }
+
+/// Where a ray along z, from `z`, enters the boxes of `count` triangles at 10, 20, ...
+fn entries(z: f64, count: u32) -> Vec<f64> {
+    let mut world = World::default();
+    world.materials.push(Material::diffuse("white", crate::math::Rgb::ONE));
+    for k in 1..=count {
+        let z = 10.0 * f64::from(k);
+        let corners = [(0.0, 0.0), (1.0, 0.0), (0.5, 1.0)].map(|(x, y)| DVec3::new(x, y, z));
+        world.meshes.push(WorldMesh::new("triangle", corners.to_vec(), vec![[0, 1, 2]], 0));
+    }
+    let scene = world.into_scene(false).expect("a scene");
+    let facts: Vec<MeshFacts> = scene.meshes.iter().map(MeshFacts::of).collect();
+    let tree = CoarseTree::new(&scene, &facts, DVec3::splat(1e-6));
+    let ray = Ray::new(DVec3::new(0.5, 0.5, z), DVec3::Z);
+    let aside = Ray { org: ray.org - DVec3::X, ..ray };
+    assert_eq!(tree.entries(&aside).count(), 0, "it passes all");
+    tree.entries(&ray).map(f64::round).collect()
+}
+
+#[test]
+fn a_ray_is_traced_anew_from_the_boxes_that_it_enters() {
+    assert_eq!(entries(0.0, 2), [10.0, 20.0]);
+    assert_eq!(entries(10.0, 2), [10.0], "not from the box that it starts in");
+    let many = entries(0.0, 64);
+    assert_eq!((many.len(), many[0]), (STARTS, 10.0));
+    assert!(many.windows(2).all(|w| (60.0..=100.0).contains(&(w[1] - w[0]))), "{many:?}");
+}

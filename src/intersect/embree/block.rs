@@ -66,6 +66,15 @@ impl EmbreeIntersector<'_> {
                 hit |= nearer;
                 doubtful &= !nearer;
             }
+            for lane in each(doubtful) {
+                let former = Some(found[lane]).filter(|_| hit >> lane & 1 == 1);
+                let passed = former.map(|former| former.prim);
+                let until = former.map(|former| f64::from(former.t) + shifts[lane]);
+                hits[lane] = self.search(&rays[lane], passed.as_slice(), until, counts);
+                if hits[lane].is_some() {
+                    hit &= !(1 << lane);
+                }
+            }
         }
         let block = Block { rays, cast, shifts: &shifts, found: &found };
         for lane in each(self.recheck_block(&block, hit, hits)) {

@@ -89,16 +89,18 @@ impl EmbreeIntersector<'_> {
 ///
 /// Embree's edge functions are off by about 10 half ulp of (edge x distance x direction), rounding
 /// of vertices and ray included, and the weights are those over the triangle's area as the ray sees
-/// it: grazing hits, slivers and hits near an edge fail the test. `edge` is the longest of the
-/// mesh, so that no corner need be fetched.
+/// it: grazing hits, slivers and hits near an edge fail the test, and so does a hit that may in truth
+/// lie behind the origin. `edge` is the longest of the mesh, so that no corner need be fetched.
 #[inline(always)]
 fn is_risky(ray: &Ray, hit: &PacketHit, edge: f64) -> bool {
-    let least = hit.u.min(hit.v).min(1.0 - hit.u - hit.v);
+    let least = f64::from(hit.u.min(hit.v).min(1.0 - hit.u - hit.v));
     let length = ray.dir.length();
-    let reach = ray.org.length() + f64::from(hit.t) * length;
+    let distance = f64::from(hit.t) * length;
+    let reach = ray.org.length() + distance;
     let area = hit.ng.as_dvec3().dot(ray.dir).abs();
     // Written so that NaN is risky.
-    let is_safe = f64::from(least) * area > 16.0 * ROUNDING * edge * reach * length;
+    let is_safe =
+        (least * edge).min(distance) * area > 16.0 * ROUNDING * edge * edge * reach * length;
     !is_safe
 }
 
