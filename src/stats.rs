@@ -178,6 +178,14 @@ impl ReuseCounts {
         self.direct_inferred + self.specular_inferred + self.inferred_in_part > 0
     }
 
+    /// Number of points of one frame that were looked up in others, but for probes: of a kind of which none was inferred,
+    /// none was.
+    pub fn looked_up(&self) -> u64 {
+        let of = |inferred, points| if inferred > 0 { points } else { 0 };
+        of(self.direct_inferred + self.inferred_in_part, self.direct)
+            + of(self.specular_inferred, self.specular)
+    }
+
     /// Share of the points that were inferred, 0 to 1; `None` where there was none to infer.
     pub fn share(&self) -> Option<f64> {
         share(self.direct_inferred + self.specular_inferred, self.direct + self.specular)
@@ -296,6 +304,18 @@ impl std::fmt::Display for BadSamples {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn points_of_a_kind_that_is_not_inferred_are_not_looked_up() {
+        let counts = ReuseCounts { direct: 10, specular: 5, ..ReuseCounts::default() };
+        assert_eq!(counts.looked_up(), 0);
+        assert_eq!(ReuseCounts { direct_inferred: 1, ..counts }.looked_up(), 10);
+        assert_eq!(ReuseCounts { inferred_in_part: 1, ..counts }.looked_up(), 10);
+        assert_eq!(
+            ReuseCounts { direct_inferred: 1, specular_inferred: 1, ..counts }.looked_up(),
+            15
+        );
+    }
 
     #[test]
     fn faults_have_names_and_the_worst_one_counts() {

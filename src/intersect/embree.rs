@@ -226,21 +226,20 @@ impl<'s> EmbreeIntersector<'s> {
         let Some(candidate) = self.query(ray, Turn::None, &[]) else {
             return self.settle(ray, None, counts);
         };
-        let hit = self.recheck(ray, &candidate);
-        if self.retries() && self.is_doubtful(ray, &candidate.hit) {
-            let (prim, until) = (candidate.hit.prim, hit.map(|hit| hit.t));
-            let turned = TURNS.into_iter().find_map(|turn| {
-                counts[RayKind::Retry] += 1;
-                let again = self.query(ray, turn, &[]).filter(|again| again.hit.prim != prim)?;
-                let again = self.locate(ray, &again)?;
-                again.lies_before(until).then_some(again.hit)
-            });
-            let nearer = turned.or_else(|| self.search(ray, &[prim], until, counts));
-            if nearer.is_some() {
-                return nearer;
-            }
+        let prim = candidate.hit.prim;
+        let Some(hit) = self.recheck(ray, &candidate) else {
+            return self.settle(ray, Some(prim), counts);
+        };
+        if !self.retries() || !self.is_doubtful(ray, &candidate.hit) {
+            return Some(hit);
         }
-        hit.or_else(|| self.settle(ray, Some(candidate.hit.prim), counts))
+        let turned = TURNS.into_iter().find_map(|turn| {
+            counts[RayKind::Retry] += 1;
+            let again = self.query(ray, turn, &[]).filter(|again| again.hit.prim != prim)?;
+            let again = self.locate(ray, &again)?;
+            again.lies_before(Some(hit.t)).then_some(again.hit)
+        });
+        turned.or_else(|| self.search(ray, &[prim], Some(hit.t), counts)).or(Some(hit))
     }
 
     /// Whether the ray must have met another triangle before: from outside of a closed surface it

@@ -10,6 +10,7 @@
 
 use super::risk::{LEVELS, STEPS, of_lights, risk_of, shown};
 use crate::inference::Estimate;
+use std::ops::Add;
 
 /// Number of adjacent levels, on each side, whose findings count too when a level is judged. Their errors are scaled
 /// by the ratio of the risks.
@@ -48,16 +49,36 @@ pub struct Finding {
 pub struct ProbeFindings {
     /// The findings at the points that other frames know.
     pub list: Vec<Finding>,
-    /// How many points of the probes' camera samples a light may reach whose ratios are kept.
-    pub lit: u64,
-    /// How many of these have an estimate of a light.
+    /// The points of the probes' camera samples that a light may reach whose ratios are kept.
+    pub lit: LitPoints,
+}
+
+/// Numbers of surface points that a light may reach.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct LitPoints {
+    /// Of all of them.
+    pub all: u64,
+    /// Of those that have an estimate of a light.
     pub known: u64,
 }
 
-impl ProbeFindings {
-    /// The share of the lit points that have an estimate.
-    pub fn known_share(&self) -> f64 {
-        self.known as f64 / self.lit.max(1) as f64
+impl LitPoints {
+    /// The share that has an estimate, 0 to 1.
+    pub fn known_share(self) -> f64 {
+        self.known as f64 / self.all.max(1) as f64
+    }
+
+    /// How many have none for each that has one.
+    pub fn unknown_per_known(self) -> f64 {
+        (self.all - self.known) as f64 / self.known.max(1) as f64
+    }
+}
+
+impl Add for LitPoints {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self { all: self.all + other.all, known: self.known + other.known }
     }
 }
 

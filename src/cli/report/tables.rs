@@ -20,8 +20,7 @@ pub const EFFECTS_NOTE: &str = "Cost is weighed by fixed figures (a camera ray w
 /// Rays by the effect that cast them, with their shares.
 pub fn effects(job: &Job) -> Table {
     let rays = job.rays();
-    let reuse = job.reuse();
-    let lookups = reuse.direct + reuse.specular;
+    let lookups = job.rows.iter().map(|row| row.reuse.looked_up()).sum();
     let none = RayCounts::default();
     let audit = job.audited().map_or(none, |sums| sums.rays);
     let all_cost = of_frame(&rays, lookups) + of_frame(&audit, 0);

@@ -67,9 +67,9 @@ impl EmbreeIntersector<'_> {
                 doubtful &= !nearer;
             }
             for lane in each(doubtful) {
-                let former = Some(found[lane]).filter(|_| hit >> lane & 1 == 1);
+                let former = Some(found[lane]).filter(|former| former.prim != PrimRef::NONE);
                 let passed = former.map(|former| former.prim);
-                let until = former.map(|former| f64::from(former.t) + shifts[lane]);
+                let until = former.map(|former| well_before(&cast[lane], former.t) + shifts[lane]);
                 hits[lane] = self.search(&rays[lane], passed.as_slice(), until, counts);
                 if hits[lane].is_some() {
                     hit &= !(1 << lane);
@@ -205,7 +205,7 @@ impl EmbreeIntersector<'_> {
         }
         // The ray is the one that Embree saw: none of its shift is left.
         let locate = || self.locate(ray, &Candidate { hit: *again, shift: 0.0 });
-        is_well_before(ray, again.t, former.t)
+        f64::from(again.t) < well_before(ray, former.t)
             && locate().is_some_and(|again| again.lies_before(Some(former.t.into())))
     }
 
@@ -296,9 +296,9 @@ fn fill<const W: usize>(packet: &mut Packet<W>, rays: &[Ray], valid: Lanes) -> [
     mask
 }
 
-/// Whether `t` lies before `other` on `ray` by more than both may be off.
-fn is_well_before(ray: &Ray, t: f32, other: f32) -> bool {
+/// What lies before this on `ray`, in `t`, lies before a hit at `t` by more than both may be off.
+fn well_before(ray: &Ray, t: f32) -> f64 {
     let length = ray.dir.length();
     let reach = ray.org.length() + f64::from(t) * length;
-    f64::from(other - t) * length > 32.0 * ROUNDING * reach
+    f64::from(t) - 32.0 * ROUNDING * reach / length
 }

@@ -13,7 +13,7 @@ use crate::film::Film;
 use crate::inference::Inference;
 use crate::output::Display;
 use crate::reuse::audit::{self, AuditedFrame, AuditedPixel};
-use crate::reuse::evidence::{Evidence, Finding, ProbeFindings};
+use crate::reuse::evidence::{Evidence, Finding, LitPoints, ProbeFindings};
 use crate::reuse::{
     Gains, Judged, LookedUp, Lookup, PARTS, Probe, ProbeDraw, Reference, could_be_worth_lookups,
 };
@@ -128,7 +128,7 @@ impl SurfaceReuse<'_> {
         let all = lookup.references.iter().map(|r| r.findings());
         let probed: Vec<&ProbeFindings> = all.filter(|found| !found.list.is_empty()).collect();
         let is_knowing = |found: &&&ProbeFindings| {
-            found.list.len() >= LEAST_FINDINGS && found.known_share() >= LEAST_KNOWN
+            found.list.len() >= LEAST_FINDINGS && found.lit.known_share() >= LEAST_KNOWN
         };
         if probed.iter().filter(is_knowing).count() < LEAST_KNOWING {
             return false;
@@ -170,26 +170,16 @@ impl SurfaceReuse<'_> {
             Result::Ok((draw, mask, rendered, probe))
         };
         // Points that are seen directly, and others.
-        let seen = |probe: &Probe| {
-            [true, false].map(|direct| {
-                let (lit, known) = probe.lit_and_known(direct);
-                ProbeFindings { list: Vec::new(), lit, known }
-            })
-        };
-        let total = |[a, b]: &[ProbeFindings; 2]| ProbeFindings {
-            list: Vec::new(),
-            lit: a.lit + b.lit,
-            known: a.known + b.known,
-        };
-        let could_be = |seen: &[ProbeFindings; 2]| {
-            let shares = [&seen[0], &total(seen)].map(ProbeFindings::known_share);
+        let lit = |probe: &Probe| [true, false].map(|direct| probe.lit(direct));
+        let could_be = |[direct, other]: [LitPoints; 2]| {
+            let shares = [direct, direct + other].map(LitPoints::known_share);
             shares.iter().any(|known| could_be_worth_lookups(*known, cast))
         };
         let usually = MULTIPLES[known.min(MULTIPLES.len() - 1)];
         let multiple = if is_hopeless { HOPELESS } else { usually };
         let (mut draw, mut mask, mut first, mut own) = estimated(multiple)?;
         let mut trial = RayCounts::default();
-        if known == 0 && could_be(&seen(&own)) {
+        if known == 0 && could_be(lit(&own)) {
             trial = first.rays;
             (draw, mask, first, own) = estimated(FIRST)?;
         }
@@ -200,8 +190,7 @@ impl SurfaceReuse<'_> {
         let samples = |[x, y]: [u32; 2]| {
             counts.get(first.film.index(x, y)).copied().unwrap_or(r.settings.spp)
         };
-        let seen = seen(&own);
-        let mut findings = total(&seen);
+        let lit = lit(&own);
         let found = own.findings(again, r.settings.spp, &samples);
         let of_others = |part: usize| {
             let is_in = move |pixel: &[u32; 2]| draw.part(pixel[0], pixel[1]) == part;
@@ -210,20 +199,18 @@ impl SurfaceReuse<'_> {
         };
         let crossed =
             self.context.pool.install(|| (0..PARTS).into_par_iter().map(of_others).collect());
-        findings.list = found.iter().flat_map(|(_, f)| f).copied().collect();
-        let own: &[Finding] = &findings.list;
-        let evidence = Evidence::of(before().chain(own), tolerance);
+        let list: Vec<Finding> = found.iter().flat_map(|(_, f)| f).copied().collect();
+        let evidence = Evidence::of(before().chain(&list), tolerance);
         // The frame's own probes are traced in any case, so they cost nothing more.
-        let unknown = (seen[1].lit - seen[1].known) as f64 / seen[1].known.max(1) as f64;
-        let gains = Gains::of(&evidence, own.iter(), cast, (0.0, unknown));
-        let looked_up = if could_be(&seen) { gains.looked_up(DOUBT) } else { LookedUp::Nothing };
+        let gains = Gains::of(&evidence, list.iter(), cast, (0.0, lit[1].unknown_per_known()));
+        let looked_up = if could_be(lit) { gains.looked_up(DOUBT) } else { LookedUp::Nothing };
         Ok(Probed {
             draw,
             mask,
             traces: [first, second],
             trial,
             counts,
-            findings,
+            findings: ProbeFindings { list, lit: lit[0] + lit[1] },
             evidence,
             crossed,
             looked_up,
