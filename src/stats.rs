@@ -178,12 +178,11 @@ impl ReuseCounts {
         self.direct_inferred + self.specular_inferred + self.inferred_in_part > 0
     }
 
-    /// Number of points of one frame that were looked up in others, but for probes: of a kind of which none was inferred,
-    /// none was.
+    /// Number of points of one frame that were looked up in others, but for those of probes. Points in mirrors and
+    /// through glass of which none was inferred whole count as not looked up.
     pub fn looked_up(&self) -> u64 {
-        let of = |inferred, points| if inferred > 0 { points } else { 0 };
-        of(self.direct_inferred + self.inferred_in_part, self.direct)
-            + of(self.specular_inferred, self.specular)
+        let of = |inferred, points| if inferred { points } else { 0 };
+        of(self.is_inferred(), self.direct) + of(self.specular_inferred > 0, self.specular)
     }
 
     /// Share of the points that were inferred, 0 to 1; `None` where there was none to infer.

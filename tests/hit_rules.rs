@@ -5,7 +5,9 @@
 mod common;
 
 use common::{job, pose, render};
-use tweenray::intersect::{EmbreeIntersector, Hit, Intersector};
+use rand::Rng;
+use rand_pcg::Pcg64Mcg;
+use tweenray::intersect::{EmbreeIntersector, Hit, Intersector, Oracle};
 use tweenray::math::{Bounds3, DVec3, Rgb};
 use tweenray::ray::Ray;
 use tweenray::scene::{HitRules, Light, Material, PointLight, Recheck, Scene, World, WorldMesh};
@@ -140,6 +142,57 @@ fn a_true_hit_is_not_given_up_for_a_neighbour_seen_edge_on() {
         "the case is not hard: {} tries",
         counts[RayKind::Retry]
     );
+}
+
+/// Slivers strewn in a cube, and rays that graze them, in scene space.
+fn slivers_and_rays() -> (Scene, Vec<Ray>) {
+    let mut rng = Pcg64Mcg::new(0x511e);
+    let mut random = |most: f64| DVec3::from_array([(); 3].map(|()| rng.random_range(-most..most)));
+    let mut world = World::default();
+    world.materials.push(Material::diffuse("white", Rgb::ONE));
+    for _ in 0..100 {
+        let (middle, along) = (random(300.0), random(1.0).normalize());
+        let across = along.cross(random(1.0)).normalize();
+        let corners = [-along * 5.0, along * 6.0, across * 0.3].map(|p| middle + p);
+        world.meshes.push(common::mesh(corners.to_vec(), vec![[0, 1, 2]], 0));
+    }
+    let scene = world.into_scene(true).unwrap();
+    // As they are in f32, which turns their planes by more than a ray grazes them at.
+    let rays = (0..400_000).map(|i| {
+        let [a, b, c] = scene.meshes[i % 100].corners(0);
+        let (along, normal) = ((b - a).normalize(), (b - a).cross(c - a).normalize());
+        let [far, turn, tilt] = random(1.0).to_array();
+        let dir = along * (3.0 * turn).sin() + along.cross(normal) * (3.0 * turn).cos();
+        let dir = (dir + normal * (3e-4 * tilt)).normalize();
+        Ray::new((a + b + c) / 3.0 - dir * (1.0 + 0.98 * far), dir)
+    });
+    let rays = rays.collect();
+    (scene, rays)
+}
+
+#[test]
+fn no_grazing_ray_misses_a_sliver_where_embree_rounds_twice() {
+    let (scene, rays) = slivers_and_rays();
+    let oracle = Oracle::new(&scene);
+    let mut counts = RayCounts::default();
+    for set in ["sse4.2", "avx"] {
+        let Ok(embree) = EmbreeIntersector::new(&scene, HitRules::default(), Some(set), 1) else {
+            println!("skipped: no {set} here");
+            continue;
+        };
+        let mut together: Vec<Option<Hit>> = vec![None; rays.len()];
+        embree.intersect_batch(&rays, &mut together, &mut counts);
+        let mut met = 0;
+        for (ray, hit) in rays.iter().zip(&together) {
+            let Some(exact) = oracle.intersect(ray, &mut counts) else { continue };
+            if oracle.line(ray).edge_ulps(&oracle.corners(exact.prim).unwrap()) > 4.0 {
+                met += 1;
+                assert!(hit.is_some(), "{set}, in a block: {ray:?}");
+                assert!(embree.intersect(ray, &mut counts).is_some(), "{set}, alone: {ray:?}");
+            }
+        }
+        assert!(met > 10_000, "the rays pass the slivers by: {met} do not");
+    }
 }
 
 #[test]

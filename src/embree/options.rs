@@ -30,17 +30,16 @@ pub enum Quality {
 }
 
 impl BuildOptions<'_> {
-    /// Whether Embree's code has fused multiply-add, one rounding instead of two: on x86 that for AVX2 and
-    /// AVX-512 has.
+    /// Whether Embree's code has fused multiply-add, which rounds once instead of twice: on x86 only its code for AVX2
+    /// and AVX-512 has.
     pub fn fuses(&self) -> bool {
         #[cfg(target_arch = "x86_64")]
-        let best = is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma");
+        return match self.isa {
+            Some(isa) => matches!(isa, "avx2" | "avx512"),
+            None => is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma"),
+        };
         #[cfg(not(target_arch = "x86_64"))]
-        let best = true;
-        match self.isa {
-            Some(isa) => !cfg!(target_arch = "x86_64") || matches!(isa, "avx2" | "avx512"),
-            None => best,
-        }
+        true
     }
 
     pub(super) fn flags(&self) -> sys::RTCSceneFlags {
@@ -55,5 +54,21 @@ impl BuildOptions<'_> {
             Quality::Medium => sys::RTC_BUILD_QUALITY_MEDIUM,
             Quality::High => sys::RTC_BUILD_QUALITY_HIGH,
         }
+    }
+}
+
+#[cfg(all(test, target_arch = "x86_64"))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn code_for_processors_before_avx2_does_not_fuse() {
+        let fuses = |isa| {
+            let quality = Quality::Medium;
+            BuildOptions { threads: 1, isa: Some(isa), robust: true, quality, compact: false }
+                .fuses()
+        };
+        let sets = ["sse2", "sse4.2", "avx", "avx2", "avx512"];
+        assert_eq!(sets.map(fuses), [false, false, false, true, true]);
     }
 }

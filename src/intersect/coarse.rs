@@ -117,44 +117,42 @@ impl CoarseTree {
 
     /// Whether any ray of `bundle` may meet a triangle: never wrongly no, but for backs of the mesh that it leaves.
     pub fn may_meet(&self, bundle: &Bundle) -> bool {
-        self.leaves(bundle).next().is_some()
+        let mut at = 0;
+        while let Some(node) = self.nodes.get(at) {
+            if !bundle.may_meet(&node.bounds) {
+                at = node.skip as usize;
+                continue;
+            }
+            if node.leaf.is_some_and(|facing| !bundle.leaves_behind(&facing)) {
+                return true;
+            }
+            at += 1;
+        }
+        false
     }
 
-    /// Where `ray` enters boxes in which it may meet a triangle (in `t`, ascending): the first of each of
-    /// [`STARTS`] equal parts of its way through all boxes. A box that it starts in does not count.
+    /// Where `ray` enters the boxes (in `t`, ascending): the first of each of [`STARTS`] equal parts of its way
+    /// through all of them. A box that it starts in does not count.
     pub fn entries(&self, ray: &Ray) -> impl Iterator<Item = f64> + use<> {
         let inv_dir = 1.0 / ray.dir;
         let way = |bounds: &Bounds3| bounds.clip(ray.org, inv_dir, ray.tnear, ray.tfar);
-        let mut first = [f64::INFINITY; STARTS];
         let whole = self.nodes.first().and_then(|root| way(&root.bounds));
-        if let (Some((near, far)), Some(bundle)) = (whole, Bundle::of([ray])) {
-            let parts = STARTS as f64 / (far - near);
-            for (enters, _) in self.leaves(&bundle).filter_map(way) {
-                if enters > ray.tnear {
-                    let part = &mut first[(((enters - near) * parts) as usize).min(STARTS - 1)];
-                    *part = part.min(enters);
-                }
+        let (near, far) = whole.unwrap_or((0.0, 0.0));
+        let parts = STARTS as f64 / (far - near);
+        let mut first = [f64::INFINITY; STARTS];
+        let mut at = 0;
+        while let Some(node) = self.nodes.get(at) {
+            let Some((enters, _)) = way(&node.bounds) else {
+                at = node.skip as usize;
+                continue;
+            };
+            if node.leaf.is_some() && enters > ray.tnear {
+                let part = &mut first[(((enters - near) * parts) as usize).min(STARTS - 1)];
+                *part = part.min(enters);
             }
+            at += 1;
         }
         first.into_iter().filter(|enters| enters.is_finite())
-    }
-
-    /// The boxes in which a ray of `bundle` may meet a triangle, in the tree's order.
-    fn leaves(&self, bundle: &Bundle) -> impl Iterator<Item = &Bounds3> {
-        let mut at = 0;
-        std::iter::from_fn(move || {
-            while let Some(node) = self.nodes.get(at) {
-                if !bundle.may_meet(&node.bounds) {
-                    at = node.skip as usize;
-                    continue;
-                }
-                at += 1;
-                if node.leaf.is_some_and(|facing| !bundle.leaves_behind(&facing)) {
-                    return Some(&node.bounds);
-                }
-            }
-            None
-        })
     }
 
     /// Bytes held.

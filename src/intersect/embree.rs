@@ -8,8 +8,8 @@
 //! * Of coincident primitives the lowest `(geom_id, prim_id)` is hit.
 //! * A ray that misses although it comes near some triangle (other than the backs of a closed mesh
 //!   that it leaves) is tried again, turned by 4 ulp to one side and then to the other; and so is one
-//!   that must have missed something before its hit. Where Embree has no fused multiply-add, its errors
-//!   are larger: there such a ray is also traced from where it enters the boxes of a coarse tree.
+//!   that must have missed something before its hit, or met a phantom before it. Where Embree has no fused
+//!   multiply-add, its errors are larger: there such a ray is also traced from where it enters boxes of a coarse tree.
 //!
 //! Shadow rays report no primitive: of these, only validation and coincidence reach them.
 //!
@@ -40,6 +40,8 @@ use recheck::Located;
 const ROUNDING: f64 = 1.0 / (1u64 << 24) as f64;
 /// Largest coordinate of an origin that is not moved: the recentred scene lies within ±1.
 const NEAR: f64 = 4.0;
+/// By how much of the way to the next start a try from nearby goes on past it.
+const OVERLAP: f64 = 1e-2;
 /// Phantoms that one ray may pass.
 const MOST_PHANTOMS: usize = 4096;
 /// Rays that go through the steps together: a block of the renderer's.
@@ -83,7 +85,7 @@ enum Turn {
     OtherWay,
 }
 
-/// The further tries of a ray whose first query found nothing, or what it cannot have met first:
+/// The turned tries of a ray whose first query found nothing, a phantom, or what it cannot have met first:
 /// one turn alone may lead past an outline, or past the vertex as well. (Two more, to the other sides,
 /// find one in nine more of lost slivers: docs/decisions/016-vertices-leak.md.)
 const TURNS: [Turn; 2] = [Turn::OneWay, Turn::OtherWay];
@@ -233,13 +235,7 @@ impl<'s> EmbreeIntersector<'s> {
         if !self.retries() || !self.is_doubtful(ray, &candidate.hit) {
             return Some(hit);
         }
-        let turned = TURNS.into_iter().find_map(|turn| {
-            counts[RayKind::Retry] += 1;
-            let again = self.query(ray, turn, &[]).filter(|again| again.hit.prim != prim)?;
-            let again = self.locate(ray, &again)?;
-            again.lies_before(Some(hit.t)).then_some(again.hit)
-        });
-        turned.or_else(|| self.search(ray, &[prim], Some(hit.t), counts)).or(Some(hit))
+        self.hit_before(ray, Some(hit.t), &mut vec![prim], counts).or(Some(hit))
     }
 
     /// Whether the ray must have met another triangle before: from outside of a closed surface it
@@ -261,10 +257,15 @@ impl<'s> EmbreeIntersector<'s> {
         inside != back || (inside && perforated())
     }
 
-    /// The first true hit of `ray`, turned by a second try or not.
-    fn pursue(&self, ray: &Ray, turn: Turn, passed: &mut Vec<PrimRef>) -> Option<Located> {
+    /// The first true hit of `ray` that a `query` finds, which cannot hit the `passed` primitives; phantoms join these.
+    fn pursue(
+        &self,
+        ray: &Ray,
+        passed: &mut Vec<PrimRef>,
+        query: impl Fn(&[PrimRef]) -> Option<Candidate>,
+    ) -> Option<Located> {
         while passed.len() < MOST_PHANTOMS {
-            let candidate = self.query(ray, turn, passed)?;
+            let candidate = query(passed)?;
             // Judged by the ray that was asked for: the nudge is smaller than the tolerance.
             let located = self.locate(ray, &candidate);
             if located.is_some() {
@@ -279,45 +280,65 @@ impl<'s> EmbreeIntersector<'s> {
     #[cold]
     fn settle(&self, ray: &Ray, phantom: Option<PrimRef>, counts: &mut RayCounts) -> Option<Hit> {
         let mut passed = Vec::from_iter(phantom);
-        let behind = phantom.and_then(|_| self.pursue(ray, Turn::None, &mut passed));
+        let behind = phantom.and_then(|_| {
+            self.pursue(ray, &mut passed, |passed| self.query(ray, Turn::None, passed))
+        });
         let behind = behind.map(|behind| behind.hit);
         // Embree hit the phantom in place of a triangle beside it: what lies behind is in doubt too.
         if !self.retries() || (behind.is_none() && !self.coarse.may_meet(&Bundle::of([ray])?)) {
             return behind;
         }
-        let until = behind.map(|behind| behind.t);
         passed.extend(behind.map(|behind| behind.prim));
+        self.hit_before(ray, behind.map(|behind| behind.t), &mut passed, counts).or(behind)
+    }
+
+    /// What further tries find before `until`, or at all if nothing is known. They cannot hit the `passed` primitives.
+    #[cold]
+    fn hit_before(
+        &self,
+        ray: &Ray,
+        until: Option<f64>,
+        passed: &mut Vec<PrimRef>,
+        counts: &mut RayCounts,
+    ) -> Option<Hit> {
         let before = Ray { tfar: until.unwrap_or(ray.tfar), ..*ray };
         let turned = TURNS.into_iter().find_map(|turn| {
             counts[RayKind::Retry] += 1;
-            let again = self.pursue(&before, turn, &mut passed)?;
+            let query = |passed: &[PrimRef]| self.query(&before, turn, passed);
+            let again = self.pursue(&before, passed, query)?;
             again.lies_before(until).then_some(again.hit)
         });
-        turned.or_else(|| self.search(ray, &passed, until, counts)).or(behind)
+        turned.or_else(|| self.hit_from_nearby(ray, until, passed, counts))
     }
 
-    /// What the ray meets before `until`, traced from where it enters the boxes of the coarse tree:
-    /// Embree's errors grow with the distance from the origin. It cannot hit the `passed` primitives.
+    /// The same for tries from where the ray enters boxes of the coarse tree, each as far as the next one's start:
+    /// Embree's errors grow with the distance from the origin.
     #[cold]
-    fn search(
+    fn hit_from_nearby(
         &self,
         ray: &Ray,
-        passed: &[PrimRef],
         until: Option<f64>,
+        passed: &mut Vec<PrimRef>,
         counts: &mut RayCounts,
     ) -> Option<Hit> {
         if !self.searches {
             return None;
         }
-        let ray = Ray { tfar: until.unwrap_or(ray.tfar), ..*ray };
-        self.coarse.entries(&ray).find_map(|start| {
+        let before = Ray { tfar: until.unwrap_or(ray.tfar), ..*ray };
+        let mut starts = self.coarse.entries(&before).peekable();
+        while let Some(start) = starts.next() {
             counts[RayKind::Retry] += 1;
-            let (tnear, tfar) = (ray.tnear - start, ray.tfar - start);
-            let moved = Ray { org: ray.at(start), tnear, tfar, ..ray };
-            let again = self.query_as(&ray, &moved, start, passed)?;
-            let again = self.locate(&ray, &again)?;
-            again.lies_before(until).then_some(again.hit)
-        })
+            // A little further, so that rounding leaves no gap.
+            let end = starts.peek().map_or(before.tfar, |next| next + OVERLAP * (next - start));
+            let (tnear, tfar) = (before.tnear - start, end.min(before.tfar) - start);
+            let moved = Ray { org: before.at(start), tnear, tfar, ..before };
+            let query = |passed: &[PrimRef]| self.query_as(&before, &moved, start, passed);
+            let again = self.pursue(&before, passed, query);
+            if let Some(again) = again.filter(|again| again.lies_before(until)) {
+                return Some(again.hit);
+            }
+        }
+        None
     }
 }
 
@@ -371,3 +392,6 @@ impl Intersector for EmbreeIntersector<'_> {
         self.committed.memory() + self.coarse.memory()
     }
 }
+
+#[cfg(test)]
+mod tests;

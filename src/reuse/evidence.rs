@@ -50,19 +50,19 @@ pub struct ProbeFindings {
     /// The findings at the points that other frames know.
     pub list: Vec<Finding>,
     /// The points of the probes' camera samples that a light may reach whose ratios are kept.
-    pub lit: LitPoints,
+    pub lit: LitCounts,
 }
 
 /// Numbers of surface points that a light may reach.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct LitPoints {
-    /// Of all of them.
+pub struct LitCounts {
+    /// All of them.
     pub all: u64,
-    /// Of those that have an estimate of a light.
+    /// Those that have an estimate of a light.
     pub known: u64,
 }
 
-impl LitPoints {
+impl LitCounts {
     /// The share that has an estimate, 0 to 1.
     pub fn known_share(self) -> f64 {
         self.known as f64 / self.all.max(1) as f64
@@ -74,7 +74,7 @@ impl LitPoints {
     }
 }
 
-impl Add for LitPoints {
+impl Add for LitCounts {
     type Output = Self;
 
     fn add(self, other: Self) -> Self {

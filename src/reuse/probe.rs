@@ -2,7 +2,7 @@
 
 use super::Lookup;
 use super::check::agrees;
-use super::evidence::{Finding, LightComparison, LitPoints, findings_of};
+use super::evidence::{Finding, LightComparison, LitCounts, findings_of};
 use crate::film::Provenance;
 use crate::inference::{Estimate, Inference, LookupBatch, SurfacePoint, channel_of};
 use crate::sampling::mix;
@@ -119,7 +119,7 @@ impl<'a> Probe<'a> {
     }
 
     /// Of the recorded points that a pixel shows directly, or of the others, those that a light may reach.
-    pub fn lit(&self, direct: bool) -> LitPoints {
+    pub fn lit(&self, direct: bool) -> LitCounts {
         let notes = self.notes.lock().unwrap_or_else(PoisonError::into_inner);
         let is_lit = |light: &&LightComparison| light.unshadowed != 0.0;
         let lit = notes.iter().filter(|note| {
@@ -129,7 +129,7 @@ impl<'a> Probe<'a> {
             note.lights.iter().filter(is_lit).any(|light| !light.estimate.ratio.is_nan())
         };
         let known = lit.clone().filter(is_known).count() as u64;
-        LitPoints { all: lit.count() as u64, known }
+        LitCounts { all: lit.count() as u64, known }
     }
 
     /// The findings by pixel (column, row). `self` recorded estimates and traces, `other` a second trace of the same

@@ -11,7 +11,7 @@
 
 use super::Reference;
 use super::columns::{self, deflated, inflated, take, take_u32};
-use super::evidence::{Finding, LitPoints, ProbeFindings};
+use super::evidence::{Finding, LitCounts, ProbeFindings};
 use super::risk::LEVELS;
 use crate::error::{Error, Result};
 use crate::inference::{Channel, Channels, SurfacePoint, TracedPoint, TracedPoints, most_ratio};
@@ -278,7 +278,7 @@ fn record_of(
     let raw = inflated(body, size_of_record(head.points, words, head.findings)?)?;
     let (points, findings) = raw.split_at_checked(4 * words * head.points)?;
     let list: Option<Vec<Finding>> = findings.chunks_exact(FINDING).map(finding_of).collect();
-    let lit = LitPoints { all: head.lit, known: head.known };
+    let lit = LitCounts { all: head.lit, known: head.known };
     let findings = ProbeFindings { list: list?, lit };
     let traced = points_of(points, head.points, terms, camera)?;
     (lit.known <= lit.all).then_some((traced, findings))
@@ -404,7 +404,7 @@ mod tests {
     fn findings() -> ProbeFindings {
         let one = Finding { level: 7, agreed: true, error: -0.5, noise: 0.25 };
         let list = vec![one, Finding { level: 0, agreed: false, error: 9.0, noise: 0.0 }];
-        ProbeFindings { list, lit: LitPoints { all: 3, known: 2 } }
+        ProbeFindings { list, lit: LitCounts { all: 3, known: 2 } }
     }
 
     fn encoded(traced: &TracedPoints, crop: Option<Rect>) -> Vec<u8> {

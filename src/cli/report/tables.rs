@@ -20,7 +20,9 @@ pub const EFFECTS_NOTE: &str = "Cost is weighed by fixed figures (a camera ray w
 /// Rays by the effect that cast them, with their shares.
 pub fn effects(job: &Job) -> Table {
     let rays = job.rays();
-    let lookups = job.rows.iter().map(|row| row.reuse.looked_up()).sum();
+    // Copies of other frames have no rays.
+    let traced = job.rows.iter().filter(|row| row.rays.total() > 0);
+    let lookups = traced.map(|row| row.reuse.looked_up()).sum();
     let none = RayCounts::default();
     let audit = job.audited().map_or(none, |sums| sums.rays);
     let all_cost = of_frame(&rays, lookups) + of_frame(&audit, 0);

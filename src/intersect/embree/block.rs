@@ -66,14 +66,8 @@ impl EmbreeIntersector<'_> {
                 hit |= nearer;
                 doubtful &= !nearer;
             }
-            for lane in each(doubtful) {
-                let former = Some(found[lane]).filter(|former| former.prim != PrimRef::NONE);
-                let passed = former.map(|former| former.prim);
-                let until = former.map(|former| well_before(&cast[lane], former.t) + shifts[lane]);
-                hits[lane] = self.search(&rays[lane], passed.as_slice(), until, counts);
-                if hits[lane].is_some() {
-                    hit &= !(1 << lane);
-                }
+            if self.searches {
+                hit &= !self.search_nearby(rays, &shifts, doubtful, &found, hits, counts);
             }
         }
         let block = Block { rays, cast, shifts: &shifts, found: &found };
@@ -198,6 +192,37 @@ impl EmbreeIntersector<'_> {
         hit
     }
 
+    /// Traces the `doubtful` lanes from nearby; returns those whose hit, or miss, is final.
+    fn search_nearby(
+        &self,
+        rays: &[Ray],
+        shifts: &[f64; BLOCK],
+        doubtful: Lanes,
+        found: &[PacketHit; BLOCK],
+        hits: &mut [Option<Hit>],
+        counts: &mut RayCounts,
+    ) -> Lanes {
+        let mut settled = 0;
+        for lane in each(doubtful) {
+            let (ray, candidate) =
+                (&rays[lane], Candidate { hit: found[lane], shift: shifts[lane] });
+            let mut passed = Vec::new();
+            let mut former = None;
+            if candidate.hit.prim != PrimRef::NONE {
+                former = self.recheck(ray, &candidate);
+                if former.is_none() {
+                    // A phantom, to be settled.
+                    continue;
+                }
+                passed.push(candidate.hit.prim);
+            }
+            let until = former.map(|former| former.t);
+            hits[lane] = self.hit_from_nearby(ray, until, &mut passed, counts).or(former);
+            settled |= 1 << lane;
+        }
+        settled
+    }
+
     /// Whether what a turned ray found lies before what the ray found as it was asked for.
     fn is_nearer(&self, ray: &Ray, again: &PacketHit, former: &PacketHit) -> bool {
         if former.prim == PrimRef::NONE {
@@ -205,7 +230,7 @@ impl EmbreeIntersector<'_> {
         }
         // The ray is the one that Embree saw: none of its shift is left.
         let locate = || self.locate(ray, &Candidate { hit: *again, shift: 0.0 });
-        f64::from(again.t) < well_before(ray, former.t)
+        is_well_before(ray, again.t, former.t)
             && locate().is_some_and(|again| again.lies_before(Some(former.t.into())))
     }
 
@@ -296,9 +321,9 @@ fn fill<const W: usize>(packet: &mut Packet<W>, rays: &[Ray], valid: Lanes) -> [
     mask
 }
 
-/// What lies before this on `ray`, in `t`, lies before a hit at `t` by more than both may be off.
-fn well_before(ray: &Ray, t: f32) -> f64 {
+/// Whether `t` lies before `other` on `ray` by more than both may be off.
+fn is_well_before(ray: &Ray, t: f32, other: f32) -> bool {
     let length = ray.dir.length();
     let reach = ray.org.length() + f64::from(t) * length;
-    f64::from(t) - 32.0 * ROUNDING * reach / length
+    f64::from(other - t) * length > 32.0 * ROUNDING * reach
 }

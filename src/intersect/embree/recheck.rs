@@ -98,9 +98,9 @@ fn is_risky(ray: &Ray, hit: &PacketHit, edge: f64) -> bool {
     let distance = f64::from(hit.t) * length;
     let reach = ray.org.length() + distance;
     let area = hit.ng.as_dvec3().dot(ray.dir).abs();
+    let bound = 16.0 * ROUNDING * edge * reach * length;
     // Written so that NaN is risky.
-    let is_safe =
-        (least * edge).min(distance) * area > 16.0 * ROUNDING * edge * edge * reach * length;
+    let is_safe = least * area > bound && distance * area > bound * edge;
     !is_safe
 }
 
@@ -123,4 +123,20 @@ fn beside(ray: &Ray, corners: &[DVec3; 3], met: PlaneHit, shift: f64) -> Option<
     // 1 over the cosine to the normal; infinite in the plane.
     let slope = normal.length() * length / normal.dot(ray.dir).abs();
     Some((PlaneHit { t, ..nearest }, band * (1.0 + slope) / length))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Vec3;
+
+    #[test]
+    fn a_hit_that_may_lie_behind_the_origin_is_risky() {
+        let ray = Ray::new(DVec3::X, DVec3::Z);
+        let prim = PrimRef { geom_id: 0, prim_id: 0 };
+        let at = |t: f32| PacketHit { t, u: 0.3, v: 0.3, ng: Vec3::Z, prim };
+        assert!(!is_risky(&ray, &at(1.0), 1.0));
+        assert!(is_risky(&ray, &at(1e-9), 1.0));
+        assert!(is_risky(&ray, &PacketHit { ng: Vec3::NAN, ..at(1.0) }, 1.0));
+    }
 }

@@ -13,7 +13,7 @@ use crate::film::Film;
 use crate::inference::Inference;
 use crate::output::Display;
 use crate::reuse::audit::{self, AuditedFrame, AuditedPixel};
-use crate::reuse::evidence::{Evidence, Finding, LitPoints, ProbeFindings};
+use crate::reuse::evidence::{Evidence, Finding, LitCounts, ProbeFindings};
 use crate::reuse::{
     Gains, Judged, LookedUp, Lookup, PARTS, Probe, ProbeDraw, Reference, could_be_worth_lookups,
 };
@@ -171,8 +171,8 @@ impl SurfaceReuse<'_> {
         };
         // Points that are seen directly, and others.
         let lit = |probe: &Probe| [true, false].map(|direct| probe.lit(direct));
-        let could_be = |[direct, other]: [LitPoints; 2]| {
-            let shares = [direct, direct + other].map(LitPoints::known_share);
+        let could_be = |[direct, other]: [LitCounts; 2]| {
+            let shares = [direct, direct + other].map(LitCounts::known_share);
             shares.iter().any(|known| could_be_worth_lookups(*known, cast))
         };
         let usually = MULTIPLES[known.min(MULTIPLES.len() - 1)];
