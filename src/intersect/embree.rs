@@ -77,6 +77,32 @@ struct Candidate {
     shift: f64,
 }
 
+/// What is known of a ray before a further try.
+#[derive(Default)]
+struct Known {
+    /// The nearest hit so far.
+    hit: Option<Hit>,
+    /// What a further try cannot hit: the primitive of that hit, and phantoms.
+    passed: Vec<PrimRef>,
+}
+
+impl Known {
+    fn of(hit: Hit) -> Self {
+        Self { hit: Some(hit), passed: vec![hit.prim] }
+    }
+
+    /// The part of `ray` in which a nearer hit may lie.
+    fn before(&self, ray: &Ray) -> Ray {
+        Ray { tfar: self.hit.map_or(ray.tfar, |hit| hit.t), ..*ray }
+    }
+
+    /// The hit of a further try, if it is nearer.
+    fn nearer(&self, again: &Located) -> Option<Hit> {
+        let is_nearer = self.hit.is_none_or(|hit| again.lies_before(hit.t));
+        is_nearer.then_some(again.hit)
+    }
+}
+
 /// How Embree sees a ray's direction: as it is, or turned by a few ulp to one side or the other.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Turn {
@@ -235,7 +261,7 @@ impl<'s> EmbreeIntersector<'s> {
         if !self.retries() || !self.is_doubtful(ray, &candidate.hit) {
             return Some(hit);
         }
-        self.hit_before(ray, Some(hit.t), &mut vec![prim], counts).or(Some(hit))
+        self.hit_before(ray, Known::of(hit), counts)
     }
 
     /// Whether the ray must have met another triangle before: from outside of a closed surface it
@@ -283,48 +309,38 @@ impl<'s> EmbreeIntersector<'s> {
         let behind = phantom.and_then(|_| {
             self.pursue(ray, &mut passed, |passed| self.query(ray, Turn::None, passed))
         });
-        let behind = behind.map(|behind| behind.hit);
+        let hit = behind.map(|behind| behind.hit);
         // Embree hit the phantom in place of a triangle beside it: what lies behind is in doubt too.
-        if !self.retries() || (behind.is_none() && !self.coarse.may_meet(&Bundle::of([ray])?)) {
-            return behind;
+        if !self.retries() || (hit.is_none() && !self.coarse.may_meet(&Bundle::of([ray])?)) {
+            return hit;
         }
-        passed.extend(behind.map(|behind| behind.prim));
-        self.hit_before(ray, behind.map(|behind| behind.t), &mut passed, counts).or(behind)
+        passed.extend(hit.map(|hit| hit.prim));
+        self.hit_before(ray, Known { hit, passed }, counts)
     }
 
-    /// What further tries find before `until`, or at all if nothing is known. They cannot hit the `passed` primitives.
+    /// The nearest hit: what further tries find before the `known` one, or that.
     #[cold]
-    fn hit_before(
-        &self,
-        ray: &Ray,
-        until: Option<f64>,
-        passed: &mut Vec<PrimRef>,
-        counts: &mut RayCounts,
-    ) -> Option<Hit> {
-        let before = Ray { tfar: until.unwrap_or(ray.tfar), ..*ray };
-        let turned = TURNS.into_iter().find_map(|turn| {
+    fn hit_before(&self, ray: &Ray, mut known: Known, counts: &mut RayCounts) -> Option<Hit> {
+        let before = known.before(ray);
+        for turn in TURNS {
             counts[RayKind::Retry] += 1;
             let query = |passed: &[PrimRef]| self.query(&before, turn, passed);
-            let again = self.pursue(&before, passed, query)?;
-            again.lies_before(until).then_some(again.hit)
-        });
-        turned.or_else(|| self.hit_from_nearby(ray, until, passed, counts))
+            let again = self.pursue(&before, &mut known.passed, query);
+            if let Some(nearer) = again.and_then(|again| known.nearer(&again)) {
+                return Some(nearer);
+            }
+        }
+        self.hit_from_nearby(ray, known, counts)
     }
 
     /// The same for tries from where the ray enters boxes of the coarse tree, each as far as the next one's start:
     /// Embree's errors grow with the distance from the origin.
     #[cold]
-    fn hit_from_nearby(
-        &self,
-        ray: &Ray,
-        until: Option<f64>,
-        passed: &mut Vec<PrimRef>,
-        counts: &mut RayCounts,
-    ) -> Option<Hit> {
+    fn hit_from_nearby(&self, ray: &Ray, mut known: Known, counts: &mut RayCounts) -> Option<Hit> {
         if !self.searches {
-            return None;
+            return known.hit;
         }
-        let before = Ray { tfar: until.unwrap_or(ray.tfar), ..*ray };
+        let before = known.before(ray);
         let mut starts = self.coarse.entries(&before).peekable();
         while let Some(start) = starts.next() {
             counts[RayKind::Retry] += 1;
@@ -333,12 +349,12 @@ impl<'s> EmbreeIntersector<'s> {
             let (tnear, tfar) = (before.tnear - start, end.min(before.tfar) - start);
             let moved = Ray { org: before.at(start), tnear, tfar, ..before };
             let query = |passed: &[PrimRef]| self.query_as(&before, &moved, start, passed);
-            let again = self.pursue(&before, passed, query);
-            if let Some(again) = again.filter(|again| again.lies_before(until)) {
-                return Some(again.hit);
+            let again = self.pursue(&before, &mut known.passed, query);
+            if let Some(nearer) = again.and_then(|again| known.nearer(&again)) {
+                return Some(nearer);
             }
         }
-        None
+        known.hit
     }
 }
 

@@ -26,14 +26,20 @@ fn ball(centre: DVec3, whole: bool) -> WorldMesh {
     WorldMesh::new("ball", positions, quads.flat_map(|(ring, k)| quad(ring, k)).collect(), 0)
 }
 
-/// Whether a ray that leaves the southern half of the first ball along `dir` may meet a triangle.
-fn may_meet(balls: Vec<WorldMesh>, dir: DVec3) -> bool {
+/// The scene of `meshes`, and its tree.
+fn scene_and_tree(meshes: Vec<WorldMesh>) -> (Scene, CoarseTree) {
     let mut world = World::default();
     world.materials.push(Material::diffuse("white", crate::math::Rgb::ONE));
-    world.meshes.extend(balls);
+    world.meshes = meshes;
     let scene = world.into_scene(false).expect("a scene");
     let facts: Vec<MeshFacts> = scene.meshes.iter().map(MeshFacts::of).collect();
     let tree = CoarseTree::new(&scene, &facts, DVec3::splat(1e-6));
+    (scene, tree)
+}
+
+/// Whether a ray that leaves the southern half of the first ball along `dir` may meet a triangle.
+fn may_meet(balls: Vec<WorldMesh>, dir: DVec3) -> bool {
+    let (scene, tree) = scene_and_tree(balls);
     let prim_id = scene.meshes[0].triangles.len() as u32 - 400;
     let [a, b, c] = scene.meshes[0].corners(prim_id as usize);
     let exclude = PrimRef { geom_id: 0, prim_id };
@@ -59,16 +65,12 @@ fn a_ray_that_leaves_a_closed_mesh_meets_only_other_meshes() {
 
 /// Where a ray along z, from `z`, enters the boxes of `count` triangles at 10, 20, ...
 fn entries(z: f64, count: u32) -> Vec<f64> {
-    let mut world = World::default();
-    world.materials.push(Material::diffuse("white", crate::math::Rgb::ONE));
-    for k in 1..=count {
+    let triangle = |k: u32| {
         let z = 10.0 * f64::from(k);
         let corners = [(0.0, 0.0), (1.0, 0.0), (0.5, 1.0)].map(|(x, y)| DVec3::new(x, y, z));
-        world.meshes.push(WorldMesh::new("triangle", corners.to_vec(), vec![[0, 1, 2]], 0));
-    }
-    let scene = world.into_scene(false).expect("a scene");
-    let facts: Vec<MeshFacts> = scene.meshes.iter().map(MeshFacts::of).collect();
-    let tree = CoarseTree::new(&scene, &facts, DVec3::splat(1e-6));
+        WorldMesh::new("triangle", corners.to_vec(), vec![[0, 1, 2]], 0)
+    };
+    let (_, tree) = scene_and_tree((1..=count).map(triangle).collect());
     let ray = Ray::new(DVec3::new(0.5, 0.5, z), DVec3::Z);
     let aside = Ray { org: ray.org - DVec3::X, ..ray };
     assert_eq!(tree.entries(&aside).count(), 0, "it passes all");

@@ -2,7 +2,7 @@
 
 use super::super::coarse::Bundle;
 use super::super::triangle::{Pairs, STEP};
-use super::{BLOCK, Candidate, EmbreeIntersector, ROUNDING, TURNS, Turn};
+use super::{BLOCK, Candidate, EmbreeIntersector, Known, ROUNDING, TURNS, Turn};
 use crate::embree::{CastRays, Packet, PacketHit, QueryFlags};
 use crate::math::Vec3;
 use crate::ray::{Hit, PrimRef, Ray};
@@ -204,20 +204,16 @@ impl EmbreeIntersector<'_> {
     ) -> Lanes {
         let mut settled = 0;
         for lane in each(doubtful) {
-            let (ray, candidate) =
-                (&rays[lane], Candidate { hit: found[lane], shift: shifts[lane] });
-            let mut passed = Vec::new();
-            let mut former = None;
-            if candidate.hit.prim != PrimRef::NONE {
-                former = self.recheck(ray, &candidate);
-                if former.is_none() {
+            let (ray, hit) = (&rays[lane], found[lane]);
+            let mut known = Known::default();
+            if hit.prim != PrimRef::NONE {
+                match self.recheck(ray, &Candidate { hit, shift: shifts[lane] }) {
+                    Some(hit) => known = Known::of(hit),
                     // A phantom, to be settled.
-                    continue;
+                    None => continue,
                 }
-                passed.push(candidate.hit.prim);
             }
-            let until = former.map(|former| former.t);
-            hits[lane] = self.hit_from_nearby(ray, until, &mut passed, counts).or(former);
+            hits[lane] = self.hit_from_nearby(ray, known, counts);
             settled |= 1 << lane;
         }
         settled
@@ -231,7 +227,7 @@ impl EmbreeIntersector<'_> {
         // The ray is the one that Embree saw: none of its shift is left.
         let locate = || self.locate(ray, &Candidate { hit: *again, shift: 0.0 });
         is_well_before(ray, again.t, former.t)
-            && locate().is_some_and(|again| again.lies_before(Some(former.t.into())))
+            && locate().is_some_and(|again| again.lies_before(former.t.into()))
     }
 
     pub(super) fn occluded_packets<const W: usize>(

@@ -24,8 +24,8 @@ impl Located {
     /// Whether a hit that a turned ray found lies before one at `t` of the ray as it was asked for. Seen
     /// edge on, the neighbours of a triangle all lie within the band: turned, a ray meets another of them,
     /// and that is no sign that the first was wrong.
-    pub fn lies_before(&self, t: Option<f64>) -> bool {
-        t.is_none_or(|t| self.hit.t + self.slack < t)
+    pub fn lies_before(&self, t: f64) -> bool {
+        self.hit.t + self.slack < t
     }
 }
 
