@@ -258,7 +258,8 @@ impl<'s> EmbreeIntersector<'s> {
         let Some(hit) = self.recheck(ray, &candidate) else {
             return self.settle(ray, Some(prim), counts);
         };
-        if !self.retries() || !self.is_doubtful(ray, &candidate.hit) {
+        let along = candidate.hit.ng.as_dvec3().dot(ray.dir);
+        if !self.retries() || !self.is_doubtful(ray, prim, along) {
             return Some(hit);
         }
         self.hit_before(ray, Known::of(hit), counts)
@@ -267,12 +268,17 @@ impl<'s> EmbreeIntersector<'s> {
     /// Whether the ray must have met another triangle before: from outside of a closed surface it
     /// meets a front first, and once it went in, in glass say, a back of the same mesh. From inside of one with
     /// cut-outs it may have come out through a hole, so that neither proves anything: both are in doubt.
-    fn is_doubtful(&self, ray: &Ray, hit: &PacketHit) -> bool {
+    ///
+    /// The hit lies on `prim`, whose normal has the component `along` in the ray's direction (0 for a sphere, into
+    /// which nothing slips).
+    #[inline(always)]
+    fn is_doubtful(&self, ray: &Ray, prim: PrimRef, along: f64) -> bool {
         let left = ray.exclude.geom_id;
-        let back = self.is_back(ray, hit);
+        let met = self.meshes.get(prim.geom_id as usize);
+        let back = met.is_some_and(|mesh| along * mesh.sense > 0.0);
         // The front of another mesh is right wherever the ray runs; so the triangle that it leaves is
         // mostly not looked at.
-        if !back && hit.prim.geom_id != left {
+        if !back && prim.geom_id != left {
             return false;
         }
         let inside = self.scene.meshes.get(left as usize).is_some_and(|mesh| {

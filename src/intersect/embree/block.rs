@@ -2,10 +2,12 @@
 
 use super::super::coarse::Bundle;
 use super::super::triangle::{Pairs, STEP};
+use super::recheck::is_risky;
 use super::{BLOCK, Candidate, EmbreeIntersector, Known, ROUNDING, TURNS, Turn};
 use crate::embree::{CastRays, Packet, PacketHit, QueryFlags};
 use crate::math::Vec3;
 use crate::ray::{Hit, PrimRef, Ray};
+use crate::scene::Recheck;
 use crate::stats::{RayCounts, RayKind};
 
 /// Rays of a block that are asked about together, whether they come near a triangle.
@@ -26,8 +28,7 @@ fn each(mut lanes: Lanes) -> impl Iterator<Item = usize> {
 struct Block<'b> {
     /// As they were asked for.
     rays: &'b [Ray],
-    /// As Embree saw them, each moved by its shift along it.
-    cast: &'b [Ray],
+    /// How far each was moved along itself before Embree saw it.
     shifts: &'b [f64; BLOCK],
     found: &'b [PacketHit; BLOCK],
 }
@@ -57,21 +58,23 @@ impl EmbreeIntersector<'_> {
         }
         let mut found = [NOTHING; BLOCK];
         let mut hit = self.trace::<W>(CastRays::moved(cast, rays), valid, &mut found);
+        let (doubtful, mut at_once) = self.appraise(cast, hit, &found);
         if self.retries() {
-            let missed = self.missed_near(cast, valid & !hit);
-            let mut doubtful = missed | self.doubtful_lanes(cast, hit, &found);
+            let mut doubtful = doubtful | self.missed_near(cast, valid & !hit);
             for turn in TURNS {
-                let cast = CastRays::moved(cast, rays);
-                let nearer = self.try_again::<W>(cast, &shifts, doubtful, turn, &mut found, counts);
+                let moved = CastRays::moved(cast, rays);
+                let nearer =
+                    self.try_again::<W>(moved, &shifts, doubtful, turn, &mut found, counts);
                 hit |= nearer;
+                at_once |= self.appraise(cast, nearer, &found).1;
                 doubtful &= !nearer;
             }
             if self.searches {
                 hit &= !self.search_nearby(rays, &shifts, doubtful, &found, hits, counts);
             }
         }
-        let block = Block { rays, cast, shifts: &shifts, found: &found };
-        for lane in each(self.recheck_block(&block, hit, hits)) {
+        let block = Block { rays, shifts: &shifts, found: &found };
+        for lane in each(self.recheck_block(&block, hit, at_once, hits)) {
             hits[lane] = self.settle(&rays[lane], Some(found[lane].prim), counts);
         }
     }
@@ -131,21 +134,30 @@ impl EmbreeIntersector<'_> {
         parts.filter(|part| come_near(*part)).fold(0, |near, part| near | part)
     }
 
-    /// The lanes of `hit` that must have met something before. Of camera rays these are the ones that
-    /// met a back, unless all did: a camera inside of a surface sees backs only, and they are no sign
-    /// of anything.
-    fn doubtful_lanes(&self, rays: &[Ray], hit: Lanes, found: &[PacketHit; BLOCK]) -> Lanes {
-        let doubtful = each(hit).filter(|lane| self.is_doubtful(&rays[*lane], &found[*lane]));
-        let doubtful: Lanes = doubtful.fold(0, |lanes, lane| lanes | 1 << lane);
-        let from_camera = each(hit).all(|lane| rays[lane].exclude == PrimRef::NONE);
-        if doubtful == hit && from_camera { 0 } else { doubtful }
-    }
-
-    /// Whether the ray met a surface from inside.
-    pub(super) fn is_back(&self, ray: &Ray, hit: &PacketHit) -> bool {
-        // Spheres have no facts, and no normal here; nothing slips into them.
-        let mesh = self.meshes.get(hit.prim.geom_id as usize);
-        mesh.is_some_and(|mesh| hit.ng.as_dvec3().dot(ray.dir) * mesh.sense > 0.0)
+    /// The lanes of `hit` that must have met something before, and those to be rechecked before anybody looks
+    /// at their surface.
+    fn appraise(&self, rays: &[Ray], hit: Lanes, found: &[PacketHit; BLOCK]) -> (Lanes, Lanes) {
+        let (mut doubtful, mut at_once) = (0, 0);
+        for lane in each(hit) {
+            let (ray, hit) = (&rays[lane], &found[lane]);
+            // Spheres have no facts, and no normal here.
+            let Some(mesh) = self.meshes.get(hit.prim.geom_id as usize) else {
+                at_once |= 1 << lane;
+                continue;
+            };
+            let along = hit.ng.as_dvec3().dot(ray.dir);
+            doubtful |= Lanes::from(self.is_doubtful(ray, hit.prim, along)) << lane;
+            let recheck = match self.rules.recheck {
+                Recheck::Always => true,
+                Recheck::Risky => is_risky(ray, hit, along.abs(), mesh.longest_edge),
+                Recheck::Off => false,
+            };
+            at_once |= Lanes::from(recheck) << lane;
+        }
+        // A camera inside of a surface sees backs only, and they are no sign of anything.
+        let is_camera = |lane: usize| rays[lane].exclude == PrimRef::NONE;
+        let all = doubtful == hit && each(hit).all(is_camera);
+        (if all { 0 } else { doubtful }, at_once)
     }
 
     /// Gives the `doubtful` lanes another try and keeps what it finds where that is nearer; returns
@@ -250,28 +262,33 @@ impl EmbreeIntersector<'_> {
         }
     }
 
-    /// Rechecks the hits of the lanes `hit`, many at once; returns the lanes whose hit may
-    /// be a phantom.
-    fn recheck_block(&self, block: &Block, hit: Lanes, hits: &mut [Option<Hit>]) -> Lanes {
-        let Block { rays, cast, shifts, found } = *block;
+    /// The hits of the lanes `hit`, those of `at_once` rechecked, many together; returns the lanes whose hit
+    /// may be a phantom.
+    fn recheck_block(
+        &self,
+        block: &Block,
+        hit: Lanes,
+        at_once: Lanes,
+        hits: &mut [Option<Hit>],
+    ) -> Lanes {
+        let Block { rays, shifts, found } = *block;
+        for lane in each(hit & !at_once) {
+            hits[lane] = Some(self.as_it_is(&found[lane], shifts[lane]));
+        }
         let mut lanes = [0u8; BLOCK];
         let mut corners = [[0u32; 3]; BLOCK];
         let mut wanted = 0;
         let mut open = 0;
         // Indices first, then vertices: so the processor waits for many cache misses at a time.
-        for lane in each(hit) {
-            let (ray, candidate) = (&rays[lane], &found[lane]);
-            match self.scene.meshes.get(candidate.prim.geom_id as usize) {
-                Some(mesh) if self.is_wanted(&cast[lane], candidate) => {
-                    lanes[wanted] = lane as u8;
-                    corners[wanted] = mesh.triangles[candidate.prim.prim_id as usize];
-                    wanted += 1;
-                }
-                Some(_) => hits[lane] = Some(self.as_it_is(candidate, shifts[lane])),
-                None => {
-                    hits[lane] = self.recheck_sphere(ray, candidate.prim);
-                    open |= Lanes::from(hits[lane].is_none()) << lane;
-                }
+        for lane in each(hit & at_once) {
+            let prim = found[lane].prim;
+            if let Some(mesh) = self.scene.meshes.get(prim.geom_id as usize) {
+                lanes[wanted] = lane as u8;
+                corners[wanted] = mesh.triangles[prim.prim_id as usize];
+                wanted += 1;
+            } else {
+                hits[lane] = self.recheck_sphere(&rays[lane], prim);
+                open |= Lanes::from(hits[lane].is_none()) << lane;
             }
         }
         for (lanes, corners) in lanes[..wanted].chunks(STEP).zip(corners.chunks(STEP)) {

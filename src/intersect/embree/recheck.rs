@@ -30,18 +30,6 @@ impl Located {
 }
 
 impl EmbreeIntersector<'_> {
-    /// Whether the rules want `hit`, one of a block, recomputed before anybody looks at its triangle.
-    #[inline(always)]
-    pub(super) fn is_wanted(&self, ray: &Ray, hit: &PacketHit) -> bool {
-        match self.rules.recheck {
-            Recheck::Always => true,
-            Recheck::Risky => {
-                is_risky(ray, hit, self.meshes[hit.prim.geom_id as usize].longest_edge)
-            }
-            Recheck::Off => false,
-        }
-    }
-
     /// The hit in f64, or `None` for a phantom.
     #[inline]
     pub(super) fn recheck(&self, ray: &Ray, candidate: &Candidate) -> Option<Hit> {
@@ -90,14 +78,14 @@ impl EmbreeIntersector<'_> {
 /// Embree's edge functions are off by about 10 half ulp of (edge x distance x direction), rounding
 /// of vertices and ray included, and the weights are those over the triangle's area as the ray sees
 /// it: grazing hits, slivers and hits near an edge fail the test, and so does a hit that may in truth
-/// lie behind the origin. `edge` is the longest of the mesh, so that no corner need be fetched.
+/// lie behind the origin. `area` is twice the triangle's as the ray sees it; `edge` the longest of the mesh, so that
+/// no corner need be fetched.
 #[inline(always)]
-fn is_risky(ray: &Ray, hit: &PacketHit, edge: f64) -> bool {
+pub(super) fn is_risky(ray: &Ray, hit: &PacketHit, area: f64, edge: f64) -> bool {
     let least = f64::from(hit.u.min(hit.v).min(1.0 - hit.u - hit.v));
     let length = ray.dir.length();
     let distance = f64::from(hit.t) * length;
     let reach = ray.org.length() + distance;
-    let area = hit.ng.as_dvec3().dot(ray.dir).abs();
     let bound = 16.0 * ROUNDING * edge * reach * length;
     // Written so that NaN is risky.
     let is_safe = least * area > bound && distance * area > bound * edge;
@@ -135,8 +123,8 @@ mod tests {
         let ray = Ray::new(DVec3::X, DVec3::Z);
         let prim = PrimRef { geom_id: 0, prim_id: 0 };
         let at = |t: f32| PacketHit { t, u: 0.3, v: 0.3, ng: Vec3::Z, prim };
-        assert!(!is_risky(&ray, &at(1.0), 1.0));
-        assert!(is_risky(&ray, &at(1e-9), 1.0));
-        assert!(is_risky(&ray, &PacketHit { ng: Vec3::NAN, ..at(1.0) }, 1.0));
+        assert!(!is_risky(&ray, &at(1.0), 1.0, 1.0));
+        assert!(is_risky(&ray, &at(1e-9), 1.0, 1.0));
+        assert!(is_risky(&ray, &at(1.0), f64::NAN, 1.0));
     }
 }
