@@ -269,8 +269,8 @@ impl<'s> EmbreeIntersector<'s> {
     /// meets a front first, and once it went in, in glass say, a back of the same mesh. From inside of one with
     /// cut-outs it may have come out through a hole, so that neither proves anything: both are in doubt.
     ///
-    /// The hit lies on `prim`, whose normal has the component `along` in the ray's direction (0 for a sphere, into
-    /// which nothing slips).
+    /// The hit lies on `prim`; `along` is the product of its normal and the ray's direction (0 for a sphere, into which
+    /// nothing slips).
     #[inline(always)]
     fn is_doubtful(&self, ray: &Ray, prim: PrimRef, along: f64) -> bool {
         let left = ray.exclude.geom_id;

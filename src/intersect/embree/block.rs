@@ -66,7 +66,7 @@ impl EmbreeIntersector<'_> {
                 let nearer =
                     self.try_again::<W>(moved, &shifts, doubtful, turn, &mut found, counts);
                 hit |= nearer;
-                at_once |= self.appraise(cast, nearer, &found).1;
+                at_once = at_once & !nearer | self.appraise(cast, nearer, &found).1;
                 doubtful &= !nearer;
             }
             if self.searches {
@@ -139,25 +139,27 @@ impl EmbreeIntersector<'_> {
     fn appraise(&self, rays: &[Ray], hit: Lanes, found: &[PacketHit; BLOCK]) -> (Lanes, Lanes) {
         let (mut doubtful, mut at_once) = (0, 0);
         for lane in each(hit) {
-            let (ray, hit) = (&rays[lane], &found[lane]);
-            // Spheres have no facts, and no normal here.
-            let Some(mesh) = self.meshes.get(hit.prim.geom_id as usize) else {
+            let (ray, candidate) = (&rays[lane], &found[lane]);
+            let prim = candidate.prim;
+            // Spheres have no facts, and no normal here; their root is found in f64 whatever the rules.
+            let Some(mesh) = self.meshes.get(prim.geom_id as usize) else {
                 at_once |= 1 << lane;
                 continue;
             };
-            let along = hit.ng.as_dvec3().dot(ray.dir);
-            doubtful |= Lanes::from(self.is_doubtful(ray, hit.prim, along)) << lane;
+            let along = candidate.ng.as_dvec3().dot(ray.dir);
+            let is_doubtful = self.retries() && self.is_doubtful(ray, prim, along);
+            doubtful |= Lanes::from(is_doubtful) << lane;
             let recheck = match self.rules.recheck {
                 Recheck::Always => true,
-                Recheck::Risky => is_risky(ray, hit, along.abs(), mesh.longest_edge),
+                Recheck::Risky => is_risky(ray, candidate, along.abs(), mesh.longest_edge),
                 Recheck::Off => false,
             };
             at_once |= Lanes::from(recheck) << lane;
         }
         // A camera inside of a surface sees backs only, and they are no sign of anything.
         let is_camera = |lane: usize| rays[lane].exclude == PrimRef::NONE;
-        let all = doubtful == hit && each(hit).all(is_camera);
-        (if all { 0 } else { doubtful }, at_once)
+        let sees_backs_only = doubtful == hit && each(hit).all(is_camera);
+        (if sees_backs_only { 0 } else { doubtful }, at_once)
     }
 
     /// Gives the `doubtful` lanes another try and keeps what it finds where that is nearer; returns
@@ -262,8 +264,8 @@ impl EmbreeIntersector<'_> {
         }
     }
 
-    /// The hits of the lanes `hit`, those of `at_once` rechecked, many together; returns the lanes whose hit
-    /// may be a phantom.
+    /// Writes the hits of the lanes `hit`, those of `at_once` rechecked, many together; returns the lanes whose
+    /// hit may be a phantom.
     fn recheck_block(
         &self,
         block: &Block,

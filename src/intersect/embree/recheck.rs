@@ -78,8 +78,8 @@ impl EmbreeIntersector<'_> {
 /// Embree's edge functions are off by about 10 half ulp of (edge x distance x direction), rounding
 /// of vertices and ray included, and the weights are those over the triangle's area as the ray sees
 /// it: grazing hits, slivers and hits near an edge fail the test, and so does a hit that may in truth
-/// lie behind the origin. `area` is twice the triangle's as the ray sees it; `edge` the longest of the mesh, so that
-/// no corner need be fetched.
+/// lie behind the origin. `area` is twice the triangle's as the ray sees it, times the length of the ray's direction;
+/// `edge` the longest of the mesh, so that no corner need be fetched.
 #[inline(always)]
 pub(super) fn is_risky(ray: &Ray, hit: &PacketHit, area: f64, edge: f64) -> bool {
     let least = f64::from(hit.u.min(hit.v).min(1.0 - hit.u - hit.v));
