@@ -150,3 +150,23 @@ fn probes_show_their_trace_and_their_findings_decide_what_is_inferred() {
     assert_eq!(with(0.25, 0.0), 0);
     assert!(with(255.0, 0.03) > usual && usual > 0, "{usual}");
 }
+
+/// What is more than tracing's own error is at most the tolerance, and not always nothing.
+#[test]
+fn a_tolerance_bounds_the_error_that_it_allows() {
+    let set = Set::load("spheres_on_terrain");
+    let stage = set.stage(2);
+    let trial = Trial { share: 0.05, ..SMALL };
+    let excess = [0.25, 1.0, 4.0].map(|tolerance| {
+        let usual = stage.settings(&trial, 1);
+        let reuse = ReuseSettings { tolerance, ..usual.reuse };
+        let settings = Settings { reuse, ..usual };
+        let truth = stage.audited_shot(&settings, &stage.shot(&trial, 1), trial.best).truth;
+        let excess = (truth.shown - truth.traced).max(0.0).sqrt();
+        println!("{tolerance}: {excess:.3}, {} pixels inferred", truth.inferred_pixels);
+        assert!(excess <= f64::from(tolerance), "{tolerance}: {excess}");
+        (excess, truth.inferred_pixels)
+    });
+    assert!(excess[0].1 < excess[1].1 && excess[1].1 < excess[2].1, "{excess:?}");
+    assert!(excess[2].0 > excess[0].0, "{excess:?}");
+}

@@ -6,9 +6,23 @@ use crate::telling::LONG;
 use clap::Parser;
 use std::path::PathBuf;
 
+/// What the tables show.
+const COLUMNS: &str = "\
+Columns, for each scene, then for each family:
+  dB            how much nearer to the truth inferred frames are than the mean of four traces, worst frame; 20 log10 of the RMSEs
+  RMSE          of that frame, in steps of 1/255, inferred and traced
+  worst tile    RMSE of the 32 x 32 tile that exceeds the target most, or comes nearest; its frame, column and row
+  >16, %        pixels off by more than 16 steps, inferred and traced
+  flicker       change of errors from frame to frame, inferred over traced; of a family median and largest
+  inf. %        share of the points that were inferred: seen directly, then in mirrors and through glass
+  speed         CPU seconds with --policy off over those with reuse; with 4 frames mostly noise
+  audit         RMSE by the audit; ! if its interval of 95 % does not contain the true error
+  kept          frames without a tile worse than traced, and those without one that is worse beyond chance
+  CPU seconds   with reuse, and with --policy off";
+
 /// Renders random scenes, or those given, and judges what was inferred.
 #[derive(Parser)]
-#[command(name = "zoo")]
+#[command(name = "zoo", after_help = COLUMNS)]
 pub struct Options {
     /// Judges this scene file, with the camera's own move and its own settings, instead of random scenes; may be repeated
     ///
@@ -26,7 +40,7 @@ pub struct Options {
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
     /// How many scenes
-    #[arg(long, default_value_t = 38)]
+    #[arg(long, default_value_t = 38, value_parser = count)]
     count: usize,
     /// Frames of each move; the first and the last are traced
     #[arg(long, default_value_t = 4, value_parser = frames)]
@@ -108,6 +122,10 @@ impl Options {
         };
         Ok((0..).filter(is_wanted).take(self.count).collect())
     }
+}
+
+fn count(text: &str) -> Result<usize, String> {
+    text.parse().ok().filter(|count| *count > 0).ok_or("wanted: 1 or more".into())
 }
 
 fn frames(text: &str) -> Result<usize, String> {

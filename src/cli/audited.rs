@@ -26,6 +26,7 @@ pub fn worse_than_traced(audits: &[(u32, AuditSums)], tolerance: f32) -> Option<
     let worse: Vec<&(u32, AuditSums)> = audits.iter().filter(is_worse).collect();
     let all = audits.iter().map(|(_, sums)| *sums).sum();
     let frames: Vec<u32> = worse.iter().map(|(frame, _)| *frame).collect();
+    let named = format!("{} {}", if frames.len() == 1 { "frame" } else { "frames" }, runs(&frames));
     let what = match (is_worse_than_traced(&all, tolerance, 1), frames.len()) {
         (false, 0) => return None,
         (true, 0) => {
@@ -34,22 +35,21 @@ pub fn worse_than_traced(audits: &[(u32, AuditSums)], tolerance: f32) -> Option<
         (true, _) => format!(
             "inferred frames are less accurate than traced ones ({}), above all {}",
             errors(&all)?,
-            runs(&frames)
+            named
         ),
         (false, n) => {
             let together = worse.iter().map(|(_, sums)| *sums).sum();
-            let (frames, errors) = (runs(&frames), errors(&together)?);
+            let errors = errors(&together)?;
             match n {
-                1 => {
-                    format!("inferred frame {frames} is less accurate than a traced one ({errors})")
-                }
-                _ => format!(
-                    "inferred frames {frames} are less accurate than traced ones ({errors})"
-                ),
+                1 => format!("inferred {named} is less accurate than a traced one ({errors})"),
+                _ => format!("inferred {named} are less accurate than traced ones ({errors})"),
             }
         }
     };
-    Some(format!("{what}: trace them with --policy off, or raise --probes"))
+    // Frames of other settings cannot lie beside those that are right.
+    Some(format!(
+        "{what}: render all again with --overwrite, and with --policy off or a larger --probes"
+    ))
 }
 
 /// The errors of inferred and of traced frames.
@@ -102,8 +102,8 @@ mod tests {
         assert_eq!(told(&[audit(1000, [0.05, 0.01])]), "", "nobody sees it");
         assert_eq!(
             told(&[audit(1000, [16.0, 4.0])]),
-            "inferred frames are less accurate than traced ones (RMSE 4.0/255 against 2.0/255), above all 2: \
-             trace them with --policy off, or raise --probes"
+            "inferred frames are less accurate than traced ones (RMSE 4.0/255 against 2.0/255), above all frame 2: \
+             render all again with --overwrite, and with --policy off or a larger --probes"
         );
     }
 
@@ -114,7 +114,7 @@ mod tests {
         assert_eq!(told(&audits), "");
         audits[5] = audit(1000, [16.0, 4.0]);
         assert!(told(&audits).starts_with(
-            "inferred frame 7 is less accurate than a traced one (RMSE 4.0/255 against 2.0/255): trace"
+            "inferred frame 7 is less accurate than a traced one (RMSE 4.0/255 against 2.0/255): render"
         ));
         audits[6] = audits[5];
         audits[30] = audits[5];

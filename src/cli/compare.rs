@@ -121,8 +121,11 @@ fn images(name: &str) -> Result<Images> {
     if path.is_dir() {
         return Ok(Images::Many(in_folder(path)?));
     }
-    if path.exists() || !name.contains('#') {
+    if path.exists() {
         return Ok(Images::One(path.to_path_buf()));
+    }
+    if !name.contains('#') {
+        return Err(Error::Usage(format!("there is no file or folder {name}")));
     }
     let pattern = FramePattern::parse(name, 2)?;
     let whole = manifest::file_name(&pattern);

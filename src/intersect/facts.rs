@@ -1,13 +1,12 @@
 //! Facts about each mesh that the hit rules use, computed once from its triangles.
 
-use crate::math::DVec3;
+use crate::math::Vec3;
+use crate::sampling::mix;
 use crate::scene::Mesh;
 use rayon::prelude::*;
 
 /// Triangles that one task sums up; fixed, so that the sums do not depend on the threads.
 const TASK: usize = 1 << 16;
-/// A mesh whose area vectors cancel to this share of its area counts as closed.
-const CLOSED: f64 = 1e-9;
 
 /// Facts of one mesh.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -17,7 +16,7 @@ pub(super) struct MeshFacts {
     /// 1 where counter-clockwise sides face outwards, -1 for a closed mesh wound inwards. An open
     /// mesh counts as wound outwards.
     pub sense: f64,
-    /// Whether it has an inside, as far as its area vectors tell.
+    /// Whether it has an inside: every edge of a triangle has a partner that runs the other way.
     pub closed: bool,
     /// Whether it would be closed but for its cut-outs, through which rays come out of it and see its backs.
     pub perforated: bool,
@@ -27,9 +26,23 @@ pub(super) struct MeshFacts {
 #[derive(Clone, Copy, Default)]
 struct Sums {
     longest2: f64,
-    area: f64,
-    area_vector: DVec3,
+    border: u64,
     volume: f64,
+}
+
+/// A fingerprint of the edges of a triangle. An edge counts with the opposite sign if it runs the other way, so the
+/// fingerprints of a closed mesh add up to 0, and those of any other do so with a chance of about 2^-60.
+fn border(corners: [Vec3; 3]) -> u64 {
+    let [a, b, c] = corners.map(|p| {
+        // What is at one place is one vertex; 0 and -0 are one place.
+        let [x, y, z] = (p + Vec3::ZERO).to_array().map(|x| u64::from(x.to_bits()));
+        let first = mix(x << 32 | y).wrapping_add(z);
+        [mix(first), mix(!first)]
+    });
+    let edge = |[a0, a1]: [u64; 2], [b0, b1]: [u64; 2]| {
+        a0.wrapping_mul(b1).wrapping_sub(a1.wrapping_mul(b0))
+    };
+    edge(a, b).wrapping_add(edge(b, c)).wrapping_add(edge(c, a))
 }
 
 impl MeshFacts {
@@ -38,25 +51,23 @@ impl MeshFacts {
         let middle = mesh.bounds.centre();
         let parts = mesh.triangles.par_chunks(TASK).map(|triangles| {
             triangles.iter().fold(Sums::default(), |sums, triangle| {
-                let [a, b, c] = triangle.map(|i| mesh.positions[i as usize].as_dvec3() - middle);
+                let corners = triangle.map(|i| mesh.positions[i as usize]);
+                let [a, b, c] = corners.map(|p| p.as_dvec3() - middle);
                 let normal = (b - a).cross(c - a);
                 let edges = [b - a, c - b, a - c].map(|edge| edge.length_squared());
                 Sums {
                     longest2: edges.into_iter().fold(sums.longest2, f64::max),
-                    area: sums.area + normal.length(),
-                    area_vector: sums.area_vector + normal,
+                    border: sums.border.wrapping_add(border(corners)),
                     volume: sums.volume + a.dot(normal),
                 }
             })
         });
         let sums = parts.collect::<Vec<_>>().into_iter().fold(Sums::default(), |a, b| Sums {
             longest2: a.longest2.max(b.longest2),
-            area: a.area + b.area,
-            area_vector: a.area_vector + b.area_vector,
+            border: a.border.wrapping_add(b.border),
             volume: a.volume + b.volume,
         });
-        // The area vectors of a closed surface cancel.
-        let closed = sums.area_vector.length() <= CLOSED * sums.area;
+        let closed = sums.border == 0;
         let inwards = closed && sums.volume < 0.0;
         Self {
             longest_edge: sums.longest2.sqrt() * (1.0 + f64::from(f32::EPSILON)),
@@ -75,7 +86,7 @@ impl MeshFacts {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::Rgb;
+    use crate::math::{DVec3, Rgb};
     use crate::scene::{Material, World, WorldMesh};
 
     fn facts_of(triangles: Vec<[u32; 3]>) -> MeshFacts {
@@ -94,6 +105,7 @@ mod tests {
         assert_eq!(facts_of(inwards.clone()).sense, -1.0);
         // Open: nobody can tell.
         assert_eq!(facts_of(inwards[..3].to_vec()).sense, 1.0);
+        assert!(facts_of(outwards.clone()).closed && !facts_of(inwards[..3].to_vec()).closed);
         let edge = facts_of(outwards).longest_edge;
         assert!(edge >= 2f64.sqrt() && edge < 1.000_001 * 2f64.sqrt());
     }

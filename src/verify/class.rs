@@ -11,20 +11,20 @@ pub const BAND_ULPS: f64 = 4.0;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Class {
-    /// Another triangle at the same place: coincident, or adjacent and the ray within the band of
-    /// their edge. Explained.
+    /// Another triangle at the same place: coincident, or so near that the order of the two is beyond the distance in f32.
+    /// Explained.
     Tie,
     /// A ray that passes within [`BAND_ULPS`] beside this one has the intersector's answer. Explained.
     EdgeBand,
     /// The hit lies within [`BAND_ULPS`] of the ray's own start or end. Explained.
     RayEnd,
-    /// The ray slipped past a vertex, within the band, onto the outside of something behind. Embree's robust
-    /// mode allows that, and the second try does not notice it. (It would notice the hit of an inside, or a
-    /// miss.) Explained, up to a limit: [`super::PAST_VERTEX_LIMIT`].
+    /// The ray passes two edges of a triangle within twice the band, at a vertex or where the triangle is seen edge on, and slips
+    /// through onto the outside of something behind. Embree's robust mode allows that, and the second try does not
+    /// notice it. (It would notice the hit of an inside, or a miss.) Explained, up to a limit:
+    /// [`super::PAST_VERTEX_LIMIT`].
     PastVertex,
-    /// The same at a vertex of a mesh that is not closed: a ray through its one side need not
-    /// meet a back behind, so there is no second try. Explained, up to a limit:
-    /// [`super::OPEN_VERTEX_LIMIT`].
+    /// The same at a mesh that is not closed: a ray through its one side need not meet a back behind, so there is no second
+    /// try. Explained, up to a limit: [`super::OPEN_VERTEX_LIMIT`].
     PastOpenVertex,
     /// A hit that is not on its triangle.
     Phantom,

@@ -41,7 +41,12 @@ impl Pass {
     /// Uncertainty along the ray, scene space: of a hit within the band, that of a ray that passes
     /// anywhere in the band.
     fn along(&self) -> f64 {
-        BAND_ULPS * self.ulp * if self.in_band() { 1.0 + self.slope } else { 1.0 }
+        if self.in_band() { self.depth() } else { BAND_ULPS * self.ulp }
+    }
+
+    /// Uncertainty along the ray of the distance in f32, by which the nearest of several hits is found.
+    fn depth(&self) -> f64 {
+        BAND_ULPS * self.ulp * (1.0 + self.slope)
     }
 }
 
@@ -80,15 +85,15 @@ impl<'a> Closely<'a> {
         let true_pass = self.pass(true_hit.prim);
         let apart = (hit.t - true_hit.t) * length;
         let ulps = apart.abs() / pass.ulp;
-        if apart.abs() <= pass.along() + true_pass.along() {
+        if apart.abs() <= pass.depth() + true_pass.depth() {
             Some(Difference { class: Class::Tie, ulps })
         } else if apart < 0.0 {
             Some(self.extra(&pass))
         } else {
             let missed = self.missed(hit.t - pass.along() / length, true_hit, Some(hit.prim));
             let slipped = missed.class == Class::Missed
-                && self.is_at_vertex(true_hit.prim)
-                && self.faces(hit.prim);
+                && self.faces(hit.prim)
+                && self.is_at_vertex(&true_hit, &true_pass);
             if !slipped {
                 return Some(missed);
             }
@@ -98,13 +103,27 @@ impl<'a> Closely<'a> {
         }
     }
 
-    /// Whether the ray passes a corner of the triangle within the band.
-    fn is_at_vertex(&self, prim: PrimRef) -> bool {
-        let dir = self.ray.dir.normalize();
-        self.check.oracle.corners(prim).is_some_and(|corners| {
-            let off = corners.map(|c| (c - self.ray.org).cross(dir).length());
-            off[0].min(off[1]).min(off[2]) <= BAND_ULPS * self.line.ulp(&corners)
-        })
+    /// Whether a triangle at the place of the hit, of the same mesh, has two edges within twice the band of the ray, so that their
+    /// bands may overlap: at a vertex, or where the triangle is seen edge on. Both edge functions are rounding noise there,
+    /// and triangles that share a vertex do not agree about it as those that share an edge do. At a T-junction the vertex
+    /// may be another triangle's.
+    fn is_at_vertex(&self, hit: &Hit, pass: &Pass) -> bool {
+        let is_at_two_edges = |prim: PrimRef| {
+            self.check.oracle.corners(prim).is_some_and(|[a, b, c]| {
+                let band = 2.0 * BAND_ULPS * self.line.ulp(&[a, b, c]);
+                let edges = [(a, b), (b, c), (c, a)];
+                let is_near = |(from, to): &&(_, _)| self.line.segment_distance(*from, *to) <= band;
+                edges.iter().filter(is_near).count() > 1
+            })
+        };
+        let is_beside = |prim: &PrimRef| {
+            let beside = self.pass(*prim);
+            let apart = |t: f64| (t - hit.t).abs() * self.ray.dir.length();
+            prim.geom_id == hit.prim.geom_id
+                && beside.t.is_none_or(|t| apart(t) <= pass.depth() + beside.depth())
+        };
+        let any_beside = || self.near().into_iter().filter(is_beside).any(is_at_two_edges);
+        is_at_two_edges(hit.prim) || any_beside()
     }
 
     /// Whether the triangle's outside faces the ray's start.
@@ -196,6 +215,11 @@ impl<'a> Closely<'a> {
             return Some(Class::EdgeBand);
         }
         let near = self.near();
+        let ends = self.border_ends(&near);
+        let is_at_end = |prim| self.is_at_border(prim) || self.is_at_one_of(prim, &ends);
+        if others.iter().all(|h| is_at_end(h.hit.prim)) {
+            return Some(Class::EdgeBand);
+        }
         let width = others.iter().map(|h| self.pass(h.hit.prim).ulp).fold(0.0, f64::max);
         let bars = |prim, by| Some(prim) != answer && self.is_hit_beside(prim, by, limit);
         let free = |by: &DVec3| !near.iter().any(|prim| bars(*prim, *by));
@@ -246,6 +270,27 @@ impl<'a> Closely<'a> {
         let edges = [(a, b), (b, c), (c, a)].into_iter().enumerate();
         let mut borders = edges.filter(|(k, _)| borders >> k & 1 == 1);
         borders.any(|(_, (from, to))| self.line.segment_distance(from, to) <= band)
+    }
+
+    /// The ends of the border edges of the `near` triangles, each with its mesh.
+    fn border_ends(&self, near: &[PrimRef]) -> Vec<(u32, DVec3)> {
+        let of = |prim: PrimRef| {
+            let corners = self.check.oracle.corners(prim)?;
+            let borders = self.check.borders_of(prim);
+            let edges = (0..3).filter(move |k| borders >> k & 1 == 1);
+            let ends = edges.flat_map(move |k| [corners[k], corners[(k + 1) % 3]]);
+            Some(ends.map(move |end| (prim.geom_id, end)))
+        };
+        near.iter().copied().filter_map(of).flatten().collect()
+    }
+
+    /// Whether the ray passes within the band of a corner of the triangle that is one of the `ends` of its mesh's borders:
+    /// at a T-junction the triangles that only touch the border with a corner have no border of their own.
+    fn is_at_one_of(&self, prim: PrimRef, ends: &[(u32, DVec3)]) -> bool {
+        let Some(corners) = self.check.oracle.corners(prim) else { return false };
+        let band = BAND_ULPS * self.line.ulp(&corners);
+        let is_end = |corner: &DVec3| ends.contains(&(prim.geom_id, *corner));
+        corners.iter().any(|c| self.line.segment_distance(*c, *c) <= band && is_end(c))
     }
 
     /// Everything that passes the ray within twice the band, spheres included.

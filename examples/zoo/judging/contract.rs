@@ -24,7 +24,7 @@ use super::frame::Picture;
 
 /// RMSE that counts as none, display steps.
 pub const FLOOR: f64 = 0.25;
-/// Standard deviations that chance is allowed: fewer than one trace in a hundred goes beyond.
+/// Standard deviations that chance is allowed: about one trace in a hundred goes beyond.
 pub const DEVIATIONS: f64 = 5.0;
 
 /// Independent traces of a frame, the traced one among them.

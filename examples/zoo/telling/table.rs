@@ -7,7 +7,7 @@ use std::fmt::Write;
 /// A row for each family, in the order of their first scenes, and one for all.
 pub fn table(told: &[Told]) -> String {
     let mut text = String::from(
-        "family          scenes frames  strict  kept   worst dB  median  worst tile   flicker  told %   speed\n",
+        "family          scenes frames  strict  kept   worst dB  median  worst tile   flicker  inf. %   speed     CPU seconds\n",
     );
     let mut seen = BTreeSet::new();
     for family in told.iter().map(|t| &t.label.family).filter(|family| seen.insert(*family)) {
@@ -29,10 +29,11 @@ fn row(text: &mut String, name: &str, told: &[&Told]) {
     let flicker: Vec<f64> = told.iter().filter_map(|t| t.flicker_ratio).collect();
     let shares: Vec<f64> = told.iter().filter_map(|t| t.inferred[0]).collect();
     let speeds: Vec<f64> = told.iter().map(|t| t.speed).collect();
+    let seconds = |job: usize| told.iter().map(|t| t.cpu_seconds[job]).sum::<f64>();
     let worst = db.iter().copied().fold(f64::INFINITY, f64::min);
     let _ = writeln!(
         text,
-        "{name:15} {:6} {:6}  {:6}  {:4}  {worst:+9.2}  {:+6.2}  {tile:>10}  {:4.2} {:4.2}  {:5.0}  {:6.2}",
+        "{name:15} {:6} {:6}  {:6}  {:4}  {worst:+9.2}  {:+6.2}  {tile:>10}  {:4.2} {:4.2}  {:5.0}  {:6.2} {:7.1}/{:.1}",
         told.len(),
         frames.len(),
         kept(|f| f.keeps_strictly),
@@ -42,6 +43,8 @@ fn row(text: &mut String, name: &str, told: &[&Told]) {
         flicker.iter().copied().fold(0.0, f64::max),
         100.0 * median(&shares),
         median(&speeds),
+        seconds(0),
+        seconds(1),
     );
 }
 

@@ -81,10 +81,13 @@ fn summary(outcome: &Outcome) -> Vec<String> {
     }
     if let Some(row) = perhaps_faster(&outcome.measured, goal, row) {
         lines.push(format!(
-            "{} may be as accurate in less time, but {} turns are too few to distinguish that from noise: \
+            "{} may be as accurate in less time, but {} too few to distinguish that from noise: \
              about 6 --turns are needed.",
             row.name(),
-            row.seconds.turns.len()
+            match row.seconds.turns.len() {
+                1 => "1 turn is".into(),
+                turns => format!("{turns} turns are"),
+            }
         ));
     }
     lines

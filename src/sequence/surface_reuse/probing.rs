@@ -116,6 +116,17 @@ fn sampling_of(counts: &[u32]) -> Sampling<'_> {
     if counts.is_empty() { Sampling::Own } else { Sampling::As(counts) }
 }
 
+/// The usual share of the pixels of a frame of so many that is probed.
+fn usual_share(probes: f32, pixels: f64) -> f64 {
+    f64::from(probes) * (LEAST / pixels).max(1.0)
+}
+
+/// The multiple of the usual share, where `known` reference frames have probes, by whose findings it may be that lookups do not
+/// pay.
+fn multiple(known: usize, is_hopeless: bool) -> f64 {
+    if is_hopeless { HOPELESS } else { MULTIPLES[known.min(MULTIPLES.len() - 1)] }
+}
+
 impl SurfaceReuse<'_> {
     /// Whether to trace the frame of `lookup` whole without a probe of its own: where in several of the frames that it
     /// would be inferred from nearly all probes had estimates, and lookups would have paid in none that has probes.
@@ -149,7 +160,7 @@ impl SurfaceReuse<'_> {
         let before = || lookup.references.iter().flat_map(|r| &r.findings().list);
         let known = lookup.references.iter().filter(|r| !r.findings().list.is_empty()).count();
         let pixels = f64::from(camera.width) * f64::from(camera.height);
-        let usual = f64::from(r.settings.reuse.probes) * (LEAST / pixels).max(1.0);
+        let usual = usual_share(r.settings.reuse.probes, pixels);
         let pay = |known: &Evidence| Gains::of(known, before(), cast, (usual, 0.0)).pay(0.0);
         let is_hopeless = known > 0 && !pay(&Evidence::of(before(), tolerance));
         // In mirrors and glass the footprint of a pixel is computed from neighbouring pixels.
@@ -175,9 +186,7 @@ impl SurfaceReuse<'_> {
             let shares = [direct, direct + other].map(LitCounts::known_share);
             shares.iter().any(|known| could_be_worth_lookups(*known, cast))
         };
-        let usually = MULTIPLES[known.min(MULTIPLES.len() - 1)];
-        let multiple = if is_hopeless { HOPELESS } else { usually };
-        let (mut draw, mut mask, mut first, mut own) = estimated(multiple)?;
+        let (mut draw, mut mask, mut first, mut own) = estimated(multiple(known, is_hopeless))?;
         let mut trial = RayCounts::default();
         if known == 0 && could_be(lit(&own)) {
             trial = first.rays;
@@ -312,5 +321,25 @@ impl SurfaceReuse<'_> {
         let (x, y) = (i as u32 % film.width, i as u32 / film.width);
         let crop = self.context.renderer.settings.crop;
         crop.is_none_or(|c| (c.x0..c.x1).contains(&x) && (c.y0..c.y1).contains(&y))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn small_frames_have_as_many_probes_as_larger_ones() {
+        for pixels in [1e6, 25_000.0] {
+            assert_eq!(usual_share(0.5, pixels), 0.5);
+        }
+        assert_eq!(usual_share(0.5, 12_500.0), 1.0);
+        assert_eq!(usual_share(0.0, 1.0), 0.0);
+    }
+
+    #[test]
+    fn few_frames_that_are_known_are_made_up_for_by_probes() {
+        assert_eq!([0, 1, 2, 3, 9].map(|known| multiple(known, false)), [1.0, 2.0, 1.0, 1.0, 1.0]);
+        assert_eq!([1, 2].map(|known| multiple(known, true)), [0.25; 2]);
     }
 }

@@ -17,13 +17,16 @@ use tweenray::verify::{Check, Class, Kind, OPEN_VERTEX_LIMIT, Tally};
 type Make = fn() -> WorldMesh;
 
 /// The open meshes by name, each within some units of the origin.
-const MESHES: [(&str, Make); 9] = [
+const MESHES: [(&str, Make); 12] = [
     ("field with holes", || thinned(sheet(), |k| suite::rng(63, k).random_ratio(9, 10))),
     ("cut sphere", || cut(false)),
     ("cut sphere, inside out", || cut(true)),
     ("cloth with slits", slits),
     ("three sheets at one edge", fins),
+    ("three flat sheets at one edge", flat_fins),
     ("T-junctions", t_junctions),
+    ("bricks in rows of three and four", bricks),
+    ("smooth sheet", smooth),
     ("sphere of loose triangles, moved by f32's rounding", loose),
     ("fans of slivers", fans),
     ("bow ties", || thinned(sheet(), |k| (k / 2 + k / 2 / CELLS) % 2 == 0)),
@@ -33,7 +36,7 @@ const CELLS: u64 = 40;
 /// Holes that nothing explains, and how many rays an open mesh's vertices let pass.
 pub fn open_meshes(size: Size) -> Outcome {
     let mut outcome = Outcome::default();
-    let rays = size.of(1_024, 20_000);
+    let rays = size.of(1_024, 100_000);
     let (mut most, mut lost, mut seen) = (0.0f64, 0, 0);
     for (name, make) in MESHES {
         let scene = scene_of(make());
@@ -158,6 +161,57 @@ fn fins() -> WorldMesh {
         let own = |i: u32| if i % row == 0 { i } else { k * count + i };
         all.triangles.extend(one.triangles.iter().map(|t| t.map(own)));
     }
+    all
+}
+
+/// The same of flat sheets, whose area vectors cancel although the mesh has no inside.
+fn flat_fins() -> WorldMesh {
+    let mut all = thinned(sheet(), |_| false);
+    all.positions.clear();
+    let (cells, row) = (10u32, 10);
+    let at =
+        |fin: u32, i: u32, j: u32| if i == 0 { j } else { 11 + (fin * cells + i - 1) * 11 + j };
+    let share = |k: u32| f64::from(k) / f64::from(cells);
+    all.positions.extend((0..=row).map(|j| DVec3::new(0.0, share(j), 0.0)));
+    for fin in 0..3u32 {
+        let (sin, cos) = (TAU * f64::from(fin) / 3.0).sin_cos();
+        for i in 1..=cells {
+            let x = share(i);
+            all.positions.extend((0..=row).map(|j| DVec3::new(cos * x, share(j), sin * x)));
+        }
+        for (i, j) in (0..cells).flat_map(|i| (0..row).map(move |j| (i, j))) {
+            let [a, b, c, d] =
+                [(i, j), (i, j + 1), (i + 1, j), (i + 1, j + 1)].map(|(i, j)| at(fin, i, j));
+            all.triangles.extend([[a, b, d], [a, d, c]]);
+        }
+    }
+    all
+}
+
+/// A wall of quads with corners of their own, in rows of three and of four: each row's corners lie on the next one's edges.
+fn bricks() -> WorldMesh {
+    const ROWS: u32 = 20;
+    let mut all = thinned(sheet(), |_| false);
+    all.positions.clear();
+    let (sin, cos) = 0.4f64.sin_cos();
+    for row in 0..ROWS {
+        let count = if row % 2 == 0 { 4 } else { 3 };
+        for k in 0..count {
+            let first = all.positions.len() as u32;
+            for (i, j) in [(k, row), (k, row + 1), (k + 1, row + 1), (k + 1, row)] {
+                let (x, y) = (f64::from(i) / f64::from(count), f64::from(j) / f64::from(ROWS));
+                all.positions.push(DVec3::new(cos * x, y, sin * x));
+            }
+            all.triangles.extend([[0, 1, 2], [0, 2, 3]].map(|t| t.map(|i| first + i)));
+        }
+    }
+    all
+}
+
+/// A smooth sheet, some of whose triangles are nearly edge on to many rays.
+fn smooth() -> WorldMesh {
+    let mut all = sheet();
+    all.positions.iter_mut().for_each(|p| p.z = 0.3 * (3.0 * p.x).sin() * (2.5 * p.y).cos());
     all
 }
 
