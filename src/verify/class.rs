@@ -18,13 +18,13 @@ pub enum Class {
     EdgeBand,
     /// The hit lies within [`BAND_ULPS`] of the ray's own start or end. Explained.
     RayEnd,
-    /// The ray passes two edges of a triangle within twice the band, at a vertex or where the triangle is seen edge on, and slips
-    /// through onto the outside of something behind. Embree's robust mode allows that, and the second try does not
-    /// notice it. (It would notice the hit of an inside, or a miss.) Explained, up to a limit:
-    /// [`super::PAST_VERTEX_LIMIT`].
+    /// The ray passes two edges of a triangle within the rounding of Embree's edge functions and slips through: at a vertex,
+    /// onto the outside of something behind, or past a triangle that is seen edge on. Embree's robust mode allows that. The
+    /// second try would notice the hit of an inside, or a miss, but may slip past a triangle that is seen edge on too.
+    /// Explained, up to a limit: [`super::PAST_VERTEX_LIMIT`].
     PastVertex,
-    /// The same at a mesh that is not closed: a ray through its one side need not meet a back behind, so there is no second
-    /// try. Explained, up to a limit: [`super::OPEN_VERTEX_LIMIT`].
+    /// The same at a mesh that is not closed: a ray through its one side need not meet a back behind, so there may be no
+    /// second try. Explained, up to a limit: [`super::OPEN_VERTEX_LIMIT`].
     PastOpenVertex,
     /// A hit that is not on its triangle.
     Phantom,

@@ -9,6 +9,10 @@ use crate::math::{DVec3, orthonormal_basis};
 /// Rays around the given one that are tried for a gap: on the band's rim and half-way to it.
 const AROUND: u32 = 16;
 
+/// Bound of the rounding of Embree's edge functions, as a distance across the ray: ulp (2⁻²³) of the way from the
+/// scene's middle to the ray's start and from there to the hit. The recheck takes the same bound.
+const EDGE_NOISE: f64 = 8.0;
+
 /// A ray with its line, and the scene to look it up in.
 pub struct Closely<'a> {
     check: &'a Check<'a>,
@@ -58,7 +62,7 @@ impl<'a> Closely<'a> {
     /// Classifies two closest hits.
     pub fn hits(&self, product: Option<Hit>, oracle: Option<Hit>) -> Option<Difference> {
         let Some(hit) = product else {
-            return Some(self.missed(self.ray.tfar, oracle?, None));
+            return Some(self.missed(self.ray.tfar, &oracle?, None));
         };
         let hit = self.refined(hit);
         let pass = self.pass(hit.prim);
@@ -90,40 +94,35 @@ impl<'a> Closely<'a> {
         } else if apart < 0.0 {
             Some(self.extra(&pass))
         } else {
-            let missed = self.missed(hit.t - pass.along() / length, true_hit, Some(hit.prim));
-            let slipped = missed.class == Class::Missed
-                && self.faces(hit.prim)
-                && self.is_at_vertex(&true_hit, &true_pass);
-            if !slipped {
-                return Some(missed);
-            }
-            let closed = self.check.is_closed(true_hit.prim.geom_id);
-            let class = if closed { Class::PastVertex } else { Class::PastOpenVertex };
-            Some(Difference { class, ..missed })
+            Some(self.missed(hit.t - pass.along() / length, &true_hit, Some(hit.prim)))
         }
     }
 
-    /// Whether a triangle at the place of the hit, of the same mesh, has two edges within twice the band of the ray, so that their
-    /// bands may overlap: at a vertex, or where the triangle is seen edge on. Both edge functions are rounding noise there,
-    /// and triangles that share a vertex do not agree about it as those that share an edge do. At a T-junction the vertex
-    /// may be another triangle's.
-    fn is_at_vertex(&self, hit: &Hit, pass: &Pass) -> bool {
-        let is_at_two_edges = |prim: PrimRef| {
-            self.check.oracle.corners(prim).is_some_and(|[a, b, c]| {
-                let band = 2.0 * BAND_ULPS * self.line.ulp(&[a, b, c]);
-                let edges = [(a, b), (b, c), (c, a)];
-                let is_near = |(from, to): &&(_, _)| self.line.segment_distance(*from, *to) <= band;
-                edges.iter().filter(is_near).count() > 1
-            })
-        };
+    /// Whether Embree's edge functions are rounding noise at the hit, and whether a triangle is seen edge on there.
+    ///
+    /// They are where two edges of a triangle of the mesh lie within the noise: at a vertex, or where the triangle is seen edge
+    /// on. Triangles that share a vertex do not agree about it as those that share an edge do. At a T-junction the vertex may be
+    /// another triangle's than the hit's.
+    fn noise_at(&self, hit: &Hit) -> [bool; 2] {
+        let length = self.ray.dir.length();
+        let pass = self.pass(hit.prim);
+        let reach = self.line.start.length() + (self.ray.at(hit.t) - self.line.start).length();
+        let noise = EDGE_NOISE * f64::from(f32::EPSILON) * reach;
         let is_beside = |prim: &PrimRef| {
             let beside = self.pass(*prim);
-            let apart = |t: f64| (t - hit.t).abs() * self.ray.dir.length();
+            let apart = |t: f64| (t - hit.t).abs() * length;
             prim.geom_id == hit.prim.geom_id
                 && beside.t.is_none_or(|t| apart(t) <= pass.depth() + beside.depth())
         };
-        let any_beside = || self.near().into_iter().filter(is_beside).any(is_at_two_edges);
-        is_at_two_edges(hit.prim) || any_beside()
+        let near = |prim: PrimRef| {
+            let [a, b, c] = self.check.oracle.corners(prim)?;
+            let is_near = |from, to| self.line.segment_distance(from, to) <= noise;
+            let edges = [(a, b), (b, c), (c, a)].into_iter().filter(|(a, b)| is_near(*a, *b));
+            let is_corner_near = [a, b, c].into_iter().any(|corner| is_near(corner, corner));
+            (edges.count() > 1).then_some(!is_corner_near)
+        };
+        let beside = self.near().into_iter().filter(is_beside).filter_map(near);
+        beside.fold([false; 2], |[_, edge_on], other| [true, edge_on | other])
     }
 
     /// Whether the triangle's outside faces the ray's start.
@@ -162,10 +161,19 @@ impl<'a> Closely<'a> {
     }
 
     /// A hit that the product does not have: it reported `answer` at about `limit`, or nothing.
-    fn missed(&self, limit: f64, hit: Hit, answer: Option<PrimRef>) -> Difference {
-        let pass = self.pass(hit.prim);
-        let class = self.gap(limit, answer).unwrap_or(Class::Missed);
-        Difference { class, ulps: pass.edge_ulps }
+    fn missed(&self, limit: f64, hit: &Hit, answer: Option<PrimRef>) -> Difference {
+        let ulps = self.pass(hit.prim).edge_ulps;
+        let class = self.gap(limit, answer).unwrap_or_else(|| {
+            let [is_noise, is_edge_on] = self.noise_at(hit);
+            // A back, or nothing, is tried again, but all that is seen edge on may be passed again.
+            let slipped = is_edge_on || (is_noise && answer.is_some_and(|prim| self.faces(prim)));
+            match slipped {
+                false => Class::Missed,
+                true if self.check.is_closed(hit.prim.geom_id) => Class::PastVertex,
+                true => Class::PastOpenVertex,
+            }
+        });
+        Difference { class, ulps }
     }
 
     /// The product says occluded, the oracle does not.
