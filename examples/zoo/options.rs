@@ -14,7 +14,7 @@ Columns, for each scene, then for each family:
   worst tile    RMSE of the 32 x 32 tile that exceeds the target most, or comes nearest; its frame, column and row
   >16, %        pixels off by more than 16 steps, inferred and traced
   flicker       change of errors from frame to frame, inferred over traced; of a family median and largest
-  inf. %        share of the points that were inferred: seen directly, then in mirrors and through glass
+  inferred      per cent of the points that were inferred: seen directly, then in mirrors and through glass
   speed         CPU seconds with --policy off over those with reuse; with 4 frames mostly noise
   audit         RMSE by the audit; ! if its interval of 95 % does not contain the true error
   kept          frames without a tile worse than traced, and those without one that is worse beyond chance

@@ -73,7 +73,7 @@ pub use tints::{PRIMARIES, part, ratio_count, tints};
 pub use too_small::Collapsed;
 pub use vertex_colours::VertexColours;
 pub(crate) use weld::weld;
-pub(crate) use winding::{borders, closed_volume};
+pub(crate) use winding::{NO_VOLUME, borders, closed_volume};
 
 use crate::math::{Bounds3, DVec3};
 use serde::{Deserialize, Serialize};

@@ -76,8 +76,11 @@ fn welded(positions: &[DVec3], triangles: &[[u32; 3]]) -> Vec<[u32; 3]> {
     }
 }
 
+/// A volume below this share of (area x extent) is rounding: the faces lie on one another and enclose nothing.
+pub(crate) const NO_VOLUME: f64 = 1e-9;
+
 /// Six times the signed volume of a closed mesh: positive when its faces wind counter-clockwise
-/// seen from outside; `None` when an edge has not exactly one partner that runs the other way.
+/// seen from outside; `None` when an edge has not exactly one partner that runs the other way, or the faces enclose nothing.
 /// Stays on this thread, since verify asks for it under a lock.
 pub(crate) fn closed_volume(positions: &[DVec3], triangles: &[[u32; 3]]) -> Option<f64> {
     let mut edges = HashMap::with_capacity(triangles.len() * 3);
@@ -92,11 +95,14 @@ pub(crate) fn closed_volume(positions: &[DVec3], triangles: &[[u32; 3]]) -> Opti
         return None;
     }
     let origin = positions[triangles[0][0] as usize];
-    let volume = triangles.iter().map(|t| {
+    let (mut volume, mut most) = (0.0, 0.0);
+    for t in triangles {
         let [a, b, c] = t.map(|i| positions[i as usize] - origin);
-        a.dot(b.cross(c))
-    });
-    Some(volume.sum())
+        let normal = (b - a).cross(c - a);
+        volume += a.dot(normal);
+        most += a.length() * normal.length();
+    }
+    (f64::abs(volume) > NO_VOLUME * most).then_some(volume)
 }
 
 /// Of each triangle, which edges (bit 0 the first, from corner 0 to 1) no other triangle has: where the
@@ -111,7 +117,8 @@ pub(crate) fn borders(positions: &[DVec3], triangles: &[[u32; 3]]) -> Vec<u8> {
         *uses.entry(edge).or_insert(0u32) += 1;
     }
     let bits = |t: &[u32; 3]| {
-        let alone = edges_of(t).map(|edge| u8::from(uses[&edge] == 1));
+        // A triangle that rounding has made a line has an edge from a vertex to itself.
+        let alone = edges_of(t).map(|(a, b)| u8::from(a != b && uses[&(a, b)] == 1));
         alone[0] | alone[1] << 1 | alone[2] << 2
     };
     welded.iter().map(bits).collect()
@@ -150,6 +157,15 @@ mod tests {
         assert_eq!(borders(&corners(), &TETRAHEDRON), [0; 4]);
         // Without the last face its edges 2-0, 0-3 and 3-2 are left to one triangle each.
         assert_eq!(borders(&corners(), &TETRAHEDRON[..3]), [1, 4, 2]);
+        let with_a_line: Vec<[u32; 3]> = TETRAHEDRON.into_iter().chain([[0, 0, 1]]).collect();
+        assert_eq!(borders(&corners(), &with_a_line), [0; 5]);
+    }
+
+    #[test]
+    fn what_encloses_nothing_is_not_closed() {
+        let positions = corners().into_iter().map(|p| DVec3::new(p.x, p.y, 0.3 * p.x + 0.7 * p.y));
+        let positions: Vec<DVec3> = positions.collect();
+        assert_eq!(closed_volume(&positions, &[[0, 1, 2], [1, 0, 2]]), None);
     }
 
     #[test]

@@ -18,14 +18,16 @@ pub enum Class {
     EdgeBand,
     /// The hit lies within [`BAND_ULPS`] of the ray's own start or end. Explained.
     RayEnd,
-    /// The ray passes two edges of a triangle within the rounding of Embree's edge functions and slips through: at a vertex,
-    /// onto the outside of something behind, or past a triangle that is seen edge on. Embree's robust mode allows that. The
-    /// second try would notice the hit of an inside, or a miss, but may slip past a triangle that is seen edge on too.
-    /// Explained, up to a limit: [`super::PAST_VERTEX_LIMIT`].
+    /// The ray slipped past a vertex, within the rounding of Embree's edge functions, onto the outside of something behind.
+    /// Embree's robust mode allows that, and the second try does not notice it. (It would notice the hit of an inside, or a
+    /// miss.) Explained, up to a limit: [`super::PAST_VERTEX_LIMIT`].
     PastVertex,
-    /// The same at a mesh that is not closed: a ray through its one side need not meet a back behind, so there may be no
-    /// second try. Explained, up to a limit: [`super::OPEN_VERTEX_LIMIT`].
+    /// The same at a vertex of a mesh that is not closed: a ray through its one side need not meet a back behind, so there
+    /// is no second try. Explained, up to a limit: [`super::OPEN_VERTEX_LIMIT`].
     PastOpenVertex,
+    /// The ray slipped past a triangle that is seen edge on: it is narrower than twice the rounding of its edge functions.
+    /// A second try may slip past it too. Explained, up to a limit: [`super::EDGE_ON_LIMIT`].
+    PastEdgeOn,
     /// A hit that is not on its triangle.
     Phantom,
     /// A hit that the product does not have, or has something behind it for.
@@ -40,12 +42,13 @@ pub enum Class {
 
 impl Class {
     /// All classes.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 11] = [
         Self::Tie,
         Self::EdgeBand,
         Self::RayEnd,
         Self::PastVertex,
         Self::PastOpenVertex,
+        Self::PastEdgeOn,
         Self::Phantom,
         Self::Missed,
         Self::WrongDistance,
@@ -55,7 +58,7 @@ impl Class {
 
     /// Whether such a difference is no fault of the product.
     pub fn is_explained(self) -> bool {
-        let past = matches!(self, Self::PastVertex | Self::PastOpenVertex);
+        let past = matches!(self, Self::PastVertex | Self::PastOpenVertex | Self::PastEdgeOn);
         past || matches!(self, Self::Tie | Self::EdgeBand | Self::RayEnd)
     }
 

@@ -13,6 +13,16 @@ const AROUND: u32 = 16;
 /// scene's middle to the ray's start and from there to the hit. The recheck takes the same bound.
 const EDGE_NOISE: f64 = 8.0;
 
+/// Where Embree's edge functions are rounding noise.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Noise {
+    None,
+    /// At a vertex.
+    Vertex,
+    /// In all of a triangle that is seen edge on.
+    EdgeOn,
+}
+
 /// A ray with its line, and the scene to look it up in.
 pub struct Closely<'a> {
     check: &'a Check<'a>,
@@ -35,6 +45,8 @@ struct Pass {
     t: Option<f64>,
     /// How far along the ray a step of one across it leads.
     slope: f64,
+    /// Whether the intersector computes `t` in f64, as it does for spheres.
+    is_exact: bool,
 }
 
 impl Pass {
@@ -45,12 +57,12 @@ impl Pass {
     /// Uncertainty along the ray, scene space: of a hit within the band, that of a ray that passes
     /// anywhere in the band.
     fn along(&self) -> f64 {
-        if self.in_band() { self.depth() } else { BAND_ULPS * self.ulp }
+        BAND_ULPS * self.ulp * if self.in_band() { 1.0 + self.slope } else { 1.0 }
     }
 
     /// Uncertainty along the ray of the distance in f32, by which the nearest of several hits is found.
     fn depth(&self) -> f64 {
-        BAND_ULPS * self.ulp * (1.0 + self.slope)
+        BAND_ULPS * self.ulp * if self.is_exact { 1.0 } else { 1.0 + self.slope }
     }
 }
 
@@ -98,39 +110,54 @@ impl<'a> Closely<'a> {
         }
     }
 
-    /// Whether Embree's edge functions are rounding noise at the hit, and whether a triangle is seen edge on there.
+    /// Where Embree's edge functions are rounding noise near the hit, in a triangle of the same mesh.
     ///
-    /// They are where two edges of a triangle of the mesh lie within the noise: at a vertex, or where the triangle is seen edge
-    /// on. Triangles that share a vertex do not agree about it as those that share an edge do. At a T-junction the vertex may be
-    /// another triangle's than the hit's.
-    fn noise_at(&self, hit: &Hit) -> [bool; 2] {
-        let length = self.ray.dir.length();
-        let pass = self.pass(hit.prim);
+    /// Triangles that share a vertex do not agree about it as those that share an edge do. At a T-junction the vertex may
+    /// be another triangle's than the hit's. A triangle that is seen edge on does not stop the ray that passes beside its
+    /// neighbours.
+    fn noise_at(&self, hit: &Hit) -> Noise {
+        let dir = self.ray.dir.normalize();
+        let depth = self.pass(hit.prim).depth();
         let reach = self.line.start.length() + (self.ray.at(hit.t) - self.line.start).length();
         let noise = EDGE_NOISE * f64::from(f32::EPSILON) * reach;
-        let is_beside = |prim: &PrimRef| {
-            let beside = self.pass(*prim);
-            let apart = |t: f64| (t - hit.t).abs() * length;
-            prim.geom_id == hit.prim.geom_id
-                && beside.t.is_none_or(|t| apart(t) <= pass.depth() + beside.depth())
+        let is_there = |prim: &PrimRef, [a, b, c]: &[DVec3; 3]| {
+            let pass = self.pass(*prim);
+            let all = [a, b, c].map(|p| (*p - self.ray.at(hit.t)).dot(dir));
+            // In its own plane the ray meets a triangle anywhere between its corners.
+            let apart = pass.t.map_or_else(
+                || all.into_iter().fold(f64::INFINITY, |least, along| least.min(along.abs())),
+                |t| (t - hit.t).abs() * self.ray.dir.length(),
+            );
+            apart <= depth + pass.depth()
         };
-        let near = |prim: PrimRef| {
-            let [a, b, c] = self.check.oracle.corners(prim)?;
-            let is_near = |from, to| self.line.segment_distance(from, to) <= noise;
-            let edges = [(a, b), (b, c), (c, a)].into_iter().filter(|(a, b)| is_near(*a, *b));
-            let is_corner_near = [a, b, c].into_iter().any(|corner| is_near(corner, corner));
-            (edges.count() > 1).then_some(!is_corner_near)
+        let of = |prim: PrimRef| {
+            let corners = self.check.oracle.corners(prim)?;
+            let [a, b, c] = corners;
+            if prim.geom_id != hit.prim.geom_id || !is_there(&prim, &corners) {
+                return None;
+            }
+            let widest = [b - a, c - b, a - c].map(|edge| edge.cross(dir).length());
+            let widest = widest.into_iter().fold(0.0, f64::max);
+            let is_edge_on = (b - a).cross(c - a).dot(dir).abs() <= 2.0 * noise * widest;
+            let is_corner_near =
+                corners.iter().any(|p| self.line.segment_distance(*p, *p) <= noise);
+            match (is_edge_on, is_corner_near) {
+                (true, _) => Some(Noise::EdgeOn),
+                (false, true) => Some(Noise::Vertex),
+                (false, false) => None,
+            }
         };
-        let beside = self.near().into_iter().filter(is_beside).filter_map(near);
-        beside.fold([false; 2], |[_, edge_on], other| [true, edge_on | other])
+        self.near(noise).into_iter().filter_map(of).max().unwrap_or(Noise::None)
     }
 
-    /// Whether the triangle's outside faces the ray's start.
+    /// Whether the outside of the primitive faces the ray's start.
     fn faces(&self, prim: PrimRef) -> bool {
-        self.check.oracle.corners(prim).is_some_and(|[a, b, c]| {
-            let along = (b - a).cross(c - a).dot(self.ray.dir);
-            if self.check.is_inwards(prim.geom_id) { along > 0.0 } else { along < 0.0 }
-        })
+        let Some([a, b, c]) = self.check.oracle.corners(prim) else {
+            let sphere = &self.check.scene.spheres[prim.prim_id as usize];
+            return self.ray.org.distance(sphere.centre) > sphere.radius;
+        };
+        let along = (b - a).cross(c - a).dot(self.ray.dir);
+        if self.check.is_inwards(prim.geom_id) { along > 0.0 } else { along < 0.0 }
     }
 
     /// A hit whose numbers were left rough, as it is when its surface is looked at.
@@ -163,15 +190,17 @@ impl<'a> Closely<'a> {
     /// A hit that the product does not have: it reported `answer` at about `limit`, or nothing.
     fn missed(&self, limit: f64, hit: &Hit, answer: Option<PrimRef>) -> Difference {
         let ulps = self.pass(hit.prim).edge_ulps;
-        let class = self.gap(limit, answer).unwrap_or_else(|| {
-            let [is_noise, is_edge_on] = self.noise_at(hit);
-            // A back, or nothing, is tried again, but all that is seen edge on may be passed again.
-            let slipped = is_edge_on || (is_noise && answer.is_some_and(|prim| self.faces(prim)));
-            match slipped {
-                false => Class::Missed,
-                true if self.check.is_closed(hit.prim.geom_id) => Class::PastVertex,
-                true => Class::PastOpenVertex,
+        let class = self.gap(limit, answer).unwrap_or_else(|| match self.noise_at(hit) {
+            // Turned rays may slip past it too, since all its edges lie in one line.
+            Noise::EdgeOn => Class::PastEdgeOn,
+            // A back, or nothing, is tried again.
+            Noise::Vertex if answer.is_some_and(|prim| self.faces(prim)) => {
+                match self.check.is_closed(hit.prim.geom_id) {
+                    true => Class::PastVertex,
+                    false => Class::PastOpenVertex,
+                }
             }
+            _ => Class::Missed,
         });
         Difference { class, ulps }
     }
@@ -179,7 +208,7 @@ impl<'a> Closely<'a> {
     /// The product says occluded, the oracle does not.
     pub fn false_shadow(&self) -> Difference {
         let none = Difference { class: Class::FalseShadow, ulps: f64::INFINITY };
-        self.near()
+        self.near(2.0 * BAND_ULPS * self.largest_ulp())
             .into_iter()
             .filter(|prim| *prim != self.ray.exclude)
             .filter(|prim| self.check.oracle.is_there(&self.ray, *prim))
@@ -222,10 +251,11 @@ impl<'a> Closely<'a> {
         if others.iter().all(|h| self.is_at_border(h.hit.prim)) {
             return Some(Class::EdgeBand);
         }
-        let near = self.near();
-        let ends = self.border_ends(&near);
-        let is_at_end = |prim| self.is_at_border(prim) || self.is_at_one_of(prim, &ends);
-        if others.iter().all(|h| is_at_end(h.hit.prim)) {
+        let near = self.near(2.0 * BAND_ULPS * self.largest_ulp());
+        if others
+            .iter()
+            .all(|h| self.is_at_border(h.hit.prim) || self.ends_border(h.hit.prim, &near))
+        {
             return Some(Class::EdgeBand);
         }
         let width = others.iter().map(|h| self.pass(h.hit.prim).ulp).fold(0.0, f64::max);
@@ -280,34 +310,32 @@ impl<'a> Closely<'a> {
         borders.any(|(_, (from, to))| self.line.segment_distance(from, to) <= band)
     }
 
-    /// The ends of the border edges of the `near` triangles, each with its mesh.
-    fn border_ends(&self, near: &[PrimRef]) -> Vec<(u32, DVec3)> {
-        let of = |prim: PrimRef| {
-            let corners = self.check.oracle.corners(prim)?;
-            let borders = self.check.borders_of(prim);
-            let edges = (0..3).filter(move |k| borders >> k & 1 == 1);
-            let ends = edges.flat_map(move |k| [corners[k], corners[(k + 1) % 3]]);
-            Some(ends.map(move |end| (prim.geom_id, end)))
-        };
-        near.iter().copied().filter_map(of).flatten().collect()
-    }
-
-    /// Whether the ray passes within the band of a corner of the triangle that is one of the `ends` of its mesh's borders:
-    /// at a T-junction the triangles that only touch the border with a corner have no border of their own.
-    fn is_at_one_of(&self, prim: PrimRef, ends: &[(u32, DVec3)]) -> bool {
+    /// Whether the ray passes within the band of a corner of the triangle at which a border of one of the `near` triangles of its
+    /// mesh ends: at a T-junction a triangle may only touch the border.
+    fn ends_border(&self, prim: PrimRef, near: &[PrimRef]) -> bool {
         let Some(corners) = self.check.oracle.corners(prim) else { return false };
         let band = BAND_ULPS * self.line.ulp(&corners);
-        let is_end = |corner: &DVec3| ends.contains(&(prim.geom_id, *corner));
-        corners.iter().any(|c| self.line.segment_distance(*c, *c) <= band && is_end(c))
+        let mut passed = corners.iter().filter(|p| self.line.segment_distance(**p, **p) <= band);
+        let ends_at = |other: &PrimRef, p: &DVec3| {
+            let corners = self.check.oracle.corners(*other);
+            let at = corners.and_then(|corners| corners.iter().position(|corner| corner == p));
+            // Edge k runs from corner k to the next one.
+            at.is_some_and(|k| self.check.borders_of(*other) & (1 << k | 1 << ((k + 2) % 3)) != 0)
+        };
+        let of_mesh = || near.iter().filter(|other| other.geom_id == prim.geom_id);
+        passed.any(|p| of_mesh().any(|other| ends_at(other, p)))
     }
 
-    /// Everything that passes the ray within twice the band, spheres included.
-    fn near(&self) -> Vec<PrimRef> {
+    /// One ulp of the largest coordinate of any triangle that there can be, or of the ray's start.
+    fn largest_ulp(&self) -> f64 {
+        let largest = self.check.scene.bounds.largest_coordinate();
+        largest.max(self.line.start.abs().max_element()) * f64::from(f32::EPSILON)
+    }
+
+    /// The triangles that pass the ray within `margin`, and all spheres.
+    fn near(&self, margin: f64) -> Vec<PrimRef> {
         let scene = self.check.scene;
-        // The largest ulp of any triangle that there can be.
-        let largest = scene.bounds.largest_coordinate().max(self.line.start.abs().max_element());
-        let ulp = largest * f64::from(f32::EPSILON);
-        let mut near = self.check.oracle.near(&self.ray, 2.0 * BAND_ULPS * ulp);
+        let mut near = self.check.oracle.near(&self.ray, margin);
         let geom_id = scene.sphere_geom_id();
         near.extend((0..scene.spheres.len() as u32).map(|prim_id| PrimRef { geom_id, prim_id }));
         near
@@ -330,6 +358,7 @@ impl<'a> Closely<'a> {
             ulp: self.line.ulp(corners),
             t: self.line.plane_t(corners),
             slope: if cos > 0.0 { 1.0 / cos } else { f64::INFINITY },
+            is_exact: false,
         }
     }
 
@@ -349,6 +378,7 @@ impl<'a> Closely<'a> {
             ulp,
             t,
             slope: s.radius / silhouette.max(0.0).sqrt() / (s.radius + offset).sqrt(),
+            is_exact: true,
         }
     }
 

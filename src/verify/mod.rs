@@ -14,7 +14,7 @@ mod tally;
 
 pub use class::{BAND_ULPS, Class, Difference};
 pub use rays::{Kind, RayId};
-pub use tally::{ClassRow, OPEN_VERTEX_LIMIT, PAST_VERTEX_LIMIT, Tally, Worst};
+pub use tally::{ClassRow, EDGE_ON_LIMIT, OPEN_VERTEX_LIMIT, PAST_VERTEX_LIMIT, Tally, Worst};
 
 use crate::intersect::{CourtHit, Hit, Intersector, Oracle, PrimRef, Ray};
 use crate::math::DVec3;

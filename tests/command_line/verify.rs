@@ -43,6 +43,7 @@ fn json_is_one_document_and_quiet_is_quiet() {
     assert_eq!(report["complete"], true);
     assert_eq!(report["past_vertex_limit"], 1e-3);
     assert_eq!(report["past_vertex_allowed"], 1);
+    assert_eq!((&report["edge_on_limit"], &report["edge_on_allowed"]), (&1e-4.into(), &1.into()));
     let tie = &classes[0];
     assert_eq!(tie["class"], "tie");
     // Rays at vertices meet several triangles.

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 /// Over the lines of [`Told::line`].
 pub const HEAD: &str = "index family          move      spp,light    dB  RMSE inf/traced  worst tile inf/traced    \
-                        >16, %    flicker  inf. %  speed  audit   kept";
+                        >16, %    flicker inferred  speed  audit   kept";
 
 /// A scene's figures.
 #[derive(Serialize)]

@@ -7,7 +7,7 @@ use std::fmt::Write;
 /// A row for each family, in the order of their first scenes, and one for all.
 pub fn table(told: &[Told]) -> String {
     let mut text = String::from(
-        "family          scenes frames  strict  kept   worst dB  median  worst tile   flicker  inf. %   speed     CPU seconds\n",
+        "family          scenes frames  strict  kept   worst dB  median  worst tile   flicker inferred  speed     CPU seconds\n",
     );
     let mut seen = BTreeSet::new();
     for family in told.iter().map(|t| &t.label.family).filter(|family| seen.insert(*family)) {

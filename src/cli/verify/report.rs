@@ -4,7 +4,8 @@ use super::{VerifyArgs, replay_command};
 use crate::cli::say;
 use crate::error::Result;
 use crate::verify::{
-    BAND_ULPS, Check, Class, ClassRow, Kind, OPEN_VERTEX_LIMIT, PAST_VERTEX_LIMIT, Tally,
+    BAND_ULPS, Check, Class, ClassRow, EDGE_ON_LIMIT, Kind, OPEN_VERTEX_LIMIT, PAST_VERTEX_LIMIT,
+    Tally,
 };
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -30,6 +31,9 @@ struct Report {
     /// The same for vertices of open meshes.
     open_vertex_limit: f64,
     open_vertex_allowed: u64,
+    /// The same for triangles seen edge on, of the edge rays.
+    edge_on_limit: f64,
+    edge_on_allowed: u64,
     classes: Vec<ClassReport>,
 }
 
@@ -61,6 +65,8 @@ pub fn print(args: &VerifyArgs, check: &Check, tally: &Tally, complete: bool) ->
         past_vertex_allowed: tally.past_vertex_allowed(),
         open_vertex_limit: OPEN_VERTEX_LIMIT,
         open_vertex_allowed: tally.open_vertex_allowed(),
+        edge_on_limit: EDGE_ON_LIMIT,
+        edge_on_allowed: tally.edge_on_allowed(),
         classes: classes.collect(),
     };
     if args.json {
@@ -72,10 +78,11 @@ pub fn print(args: &VerifyArgs, check: &Check, tally: &Tally, complete: bool) ->
 /// The meaning of a class in a few words.
 pub fn meaning(class: Class) -> &'static str {
     match class {
-        Class::Tie => "another triangle at the same place",
+        Class::Tie => "another primitive at the same place",
         Class::EdgeBand => "within the band of an edge",
         Class::PastVertex => "past a vertex, onto a front",
         Class::PastOpenVertex => "past an open mesh's vertex",
+        Class::PastEdgeOn => "past a triangle seen edge on",
         Class::RayEnd => "at the ray's own start or end",
         Class::Phantom => "phantom hit",
         Class::Missed => "missed hit",
@@ -126,9 +133,10 @@ impl Report {
             0 if !self.complete => writeln!(text, "\nnot complete: stopped before the end"),
             0 => writeln!(
                 text,
-                "\nFAILED: too many rays slipped past a vertex; the limits are {} for closed meshes \
-                 ({PAST_VERTEX_LIMIT} of the vertex rays) and {} for open ones ({OPEN_VERTEX_LIMIT})",
-                self.past_vertex_allowed, self.open_vertex_allowed
+                "\nFAILED: too many rays slipped through; the limits are {} past vertices of closed meshes \
+                 ({PAST_VERTEX_LIMIT} of the vertex rays), {} past those of open ones ({OPEN_VERTEX_LIMIT}) and {} past \
+                 triangles seen edge on ({EDGE_ON_LIMIT} of the edge rays)",
+                self.past_vertex_allowed, self.open_vertex_allowed, self.edge_on_allowed
             ),
             n => writeln!(text, "\nFAILED: {n} unexplained"),
         };

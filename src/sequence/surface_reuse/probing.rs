@@ -121,8 +121,8 @@ fn usual_share(probes: f32, pixels: f64) -> f64 {
     f64::from(probes) * (LEAST / pixels).max(1.0)
 }
 
-/// The multiple of the usual share, where `known` reference frames have probes, by whose findings it may be that lookups do not
-/// pay.
+/// The multiple of the usual share that is probed first; `known` reference frames have probes, and `is_hopeless` says that
+/// by their findings lookups do not pay.
 fn multiple(known: usize, is_hopeless: bool) -> f64 {
     if is_hopeless { HOPELESS } else { MULTIPLES[known.min(MULTIPLES.len() - 1)] }
 }
@@ -338,7 +338,7 @@ mod tests {
     }
 
     #[test]
-    fn few_frames_that_are_known_are_made_up_for_by_probes() {
+    fn a_frame_with_one_probed_reference_has_more_probes_and_a_hopeless_one_fewer() {
         assert_eq!([0, 1, 2, 3, 9].map(|known| multiple(known, false)), [1.0, 2.0, 1.0, 1.0, 1.0]);
         assert_eq!([1, 2].map(|known| multiple(known, true)), [0.25; 2]);
     }

@@ -1,4 +1,4 @@
-//! Meshes that are not closed: holes, slits, fins, T-junctions, twins, slivers and bow ties, each over a
+//! Meshes that are not closed: holes, slits, fins, T-junctions, twins, slivers and bow ties, each over a ball and a
 //! floor that whatever slips through would hit. `verify`'s own rays and verdict, half of a mesh's rays
 //! aimed at its vertices and edges.
 
@@ -10,20 +10,21 @@ use std::f64::consts::TAU;
 use std::sync::atomic::AtomicBool;
 use tweenray::intersect::{EmbreeIntersector, Oracle};
 use tweenray::math::DVec3;
-use tweenray::scene::{CameraPath, HitRules, Pose, Scene, Settings, Shot, WorldMesh};
+use tweenray::scene::{CameraPath, HitRules, Pose, Scene, Settings, Shot, WorldMesh, WorldSphere};
 use tweenray::verify::{Check, Class, Kind, OPEN_VERTEX_LIMIT, Tally};
 
 /// Makes a mesh.
 type Make = fn() -> WorldMesh;
 
 /// The open meshes by name, each within some units of the origin.
-const MESHES: [(&str, Make); 12] = [
+const MESHES: [(&str, Make); 13] = [
     ("field with holes", || thinned(sheet(), |k| suite::rng(63, k).random_ratio(9, 10))),
     ("cut sphere", || cut(false)),
     ("cut sphere, inside out", || cut(true)),
     ("cloth with slits", slits),
-    ("three sheets at one edge", fins),
-    ("three flat sheets at one edge", flat_fins),
+    ("three sheets at one edge", || fins(1.0)),
+    ("three flat sheets at one edge", || fins(0.0)),
+    ("sheet with two sides", two_sided),
     ("T-junctions", t_junctions),
     ("bricks in rows of three and four", bricks),
     ("smooth sheet", smooth),
@@ -68,7 +69,7 @@ pub fn open_meshes(size: Size) -> Outcome {
     outcome
 }
 
-/// The mesh over a floor whose front faces it.
+/// The mesh over a ball and a floor whose front faces it.
 fn scene_of(mesh: WorldMesh) -> Scene {
     let mut floor = field(1, |_, _| 0.0);
     floor
@@ -77,6 +78,7 @@ fn scene_of(mesh: WorldMesh) -> Scene {
         .for_each(|p| *p = DVec3::new(8.0 * p.x - 4.0, 8.0 * p.y - 4.0, -2.0));
     let mut world = shapes::world_of(mesh);
     world.meshes.push(floor);
+    world.spheres.push(WorldSphere::new("ball", DVec3::Z * -1.5, 0.4, 0));
     world.into_scene(true).unwrap()
 }
 
@@ -146,9 +148,11 @@ fn slits() -> WorldMesh {
     mesh
 }
 
-/// Three sheets that share one edge of many vertices.
-fn fins() -> WorldMesh {
+/// Three sheets that share one edge of many vertices. Of flat ones, of `rise` 0, the area vectors cancel.
+fn fins(rise: f64) -> WorldMesh {
     let mut all = bent(20, [0.0, 1.0]);
+    let height = |x: f64, y: f64| rise * height(x, y);
+    all.positions.iter_mut().for_each(|p| p.z *= rise);
     let (row, count) = (21, all.positions.len() as u32);
     let one = all.clone();
     for k in 1..3u32 {
@@ -164,35 +168,10 @@ fn fins() -> WorldMesh {
     all
 }
 
-/// The same of flat sheets, whose area vectors cancel although the mesh has no inside.
-fn flat_fins() -> WorldMesh {
-    let mut all = thinned(sheet(), |_| false);
-    all.positions.clear();
-    let (cells, row) = (10u32, 10);
-    let at =
-        |fin: u32, i: u32, j: u32| if i == 0 { j } else { 11 + (fin * cells + i - 1) * 11 + j };
-    let share = |k: u32| f64::from(k) / f64::from(cells);
-    all.positions.extend((0..=row).map(|j| DVec3::new(0.0, share(j), 0.0)));
-    for fin in 0..3u32 {
-        let (sin, cos) = (TAU * f64::from(fin) / 3.0).sin_cos();
-        for i in 1..=cells {
-            let x = share(i);
-            all.positions.extend((0..=row).map(|j| DVec3::new(cos * x, share(j), sin * x)));
-        }
-        for (i, j) in (0..cells).flat_map(|i| (0..row).map(move |j| (i, j))) {
-            let [a, b, c, d] =
-                [(i, j), (i, j + 1), (i + 1, j), (i + 1, j + 1)].map(|(i, j)| at(fin, i, j));
-            all.triangles.extend([[a, b, d], [a, d, c]]);
-        }
-    }
-    all
-}
-
 /// A wall of quads with corners of their own, in rows of three and of four: each row's corners lie on the next one's edges.
 fn bricks() -> WorldMesh {
     const ROWS: u32 = 20;
-    let mut all = thinned(sheet(), |_| false);
-    all.positions.clear();
+    let mut all = empty();
     let (sin, cos) = 0.4f64.sin_cos();
     for row in 0..ROWS {
         let count = if row % 2 == 0 { 4 } else { 3 };
@@ -205,6 +184,18 @@ fn bricks() -> WorldMesh {
             all.triangles.extend([[0, 1, 2], [0, 2, 3]].map(|t| t.map(|i| first + i)));
         }
     }
+    all
+}
+
+fn empty() -> WorldMesh {
+    WorldMesh { positions: Vec::new(), triangles: Vec::new(), ..sheet() }
+}
+
+/// A sheet each of whose triangles is there once more, the other way round: its edges balance, but nothing is inside.
+fn two_sided() -> WorldMesh {
+    let mut all = sheet();
+    let other: Vec<[u32; 3]> = all.triangles.iter().map(|[a, b, c]| [*a, *c, *b]).collect();
+    all.triangles.extend(other);
     all
 }
 
@@ -243,8 +234,7 @@ fn loose() -> WorldMesh {
 
 /// Flat cones of sixty slender triangles.
 fn fans() -> WorldMesh {
-    let mut mesh = sheet();
-    (mesh.positions, mesh.triangles) = (Vec::new(), Vec::new());
+    let mut mesh = empty();
     for k in 0..25u32 {
         let centre = DVec3::new(f64::from(k % 5) - 2.0, f64::from(k / 5) - 2.0, 0.1) * 0.5;
         let first = mesh.positions.len() as u32;
