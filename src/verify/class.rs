@@ -25,8 +25,8 @@ pub enum Class {
     /// The same at a vertex of a mesh that is not closed: a ray through its one side need not meet a back behind, so there
     /// is no second try. Explained, up to a limit: [`super::OPEN_VERTEX_LIMIT`].
     PastOpenVertex,
-    /// The ray slipped past a triangle that is seen edge on: it is narrower than twice the rounding of its edge functions.
-    /// A second try may slip past it too. Explained, up to a limit: [`super::EDGE_ON_LIMIT`].
+    /// The ray slipped past a triangle that is seen edge on: two of its edges, or all, lie within the rounding of their
+    /// edge functions. A second try may slip past it too. Explained, up to a limit: [`super::EDGE_ON_LIMIT`].
     PastEdgeOn,
     /// A hit that is not on its triangle.
     Phantom,

@@ -14,13 +14,12 @@ const AROUND: u32 = 16;
 const EDGE_NOISE: f64 = 8.0;
 
 /// Where Embree's edge functions are rounding noise.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Noise {
-    None,
+#[derive(Debug, Clone, Copy, Default)]
+struct Noise {
     /// At a vertex.
-    Vertex,
-    /// In all of a triangle that is seen edge on.
-    EdgeOn,
+    vertex: bool,
+    /// At two edges of a triangle, far from its corners: it is seen edge on.
+    edge_on: bool,
 }
 
 /// A ray with its line, and the scene to look it up in.
@@ -136,18 +135,19 @@ impl<'a> Closely<'a> {
             if prim.geom_id != hit.prim.geom_id || !is_there(&prim, &corners) {
                 return None;
             }
-            let widest = [b - a, c - b, a - c].map(|edge| edge.cross(dir).length());
+            let sides = [(a, b), (b, c), (c, a)];
+            let is_near = |from, to| self.line.segment_distance(from, to) <= noise;
+            let near_sides = sides.iter().filter(|(from, to)| is_near(*from, *to)).count();
+            let widest = sides.map(|(from, to)| (to - from).cross(dir).length());
             let widest = widest.into_iter().fold(0.0, f64::max);
-            let is_edge_on = (b - a).cross(c - a).dot(dir).abs() <= 2.0 * noise * widest;
-            let is_corner_near =
-                corners.iter().any(|p| self.line.segment_distance(*p, *p) <= noise);
-            match (is_edge_on, is_corner_near) {
-                (true, _) => Some(Noise::EdgeOn),
-                (false, true) => Some(Noise::Vertex),
-                (false, false) => None,
-            }
+            let is_narrow = (b - a).cross(c - a).dot(dir).abs() <= 2.0 * noise * widest;
+            let vertex = corners.iter().any(|corner| is_near(*corner, *corner));
+            Some(Noise { vertex, edge_on: is_narrow || (near_sides > 1 && !vertex) })
         };
-        self.near(noise).into_iter().filter_map(of).max().unwrap_or(Noise::None)
+        self.near(noise).into_iter().filter_map(of).fold(Noise::default(), |all, own| Noise {
+            vertex: all.vertex | own.vertex,
+            edge_on: all.edge_on | own.edge_on,
+        })
     }
 
     /// Whether the outside of the primitive faces the ray's start.
@@ -190,17 +190,20 @@ impl<'a> Closely<'a> {
     /// A hit that the product does not have: it reported `answer` at about `limit`, or nothing.
     fn missed(&self, limit: f64, hit: &Hit, answer: Option<PrimRef>) -> Difference {
         let ulps = self.pass(hit.prim).edge_ulps;
-        let class = self.gap(limit, answer).unwrap_or_else(|| match self.noise_at(hit) {
-            // Turned rays may slip past it too, since all its edges lie in one line.
-            Noise::EdgeOn => Class::PastEdgeOn,
+        let class = self.gap(limit, answer).unwrap_or_else(|| {
+            let noise = self.noise_at(hit);
             // A back, or nothing, is tried again.
-            Noise::Vertex if answer.is_some_and(|prim| self.faces(prim)) => {
+            if noise.vertex && answer.is_some_and(|prim| self.faces(prim)) {
                 match self.check.is_closed(hit.prim.geom_id) {
                     true => Class::PastVertex,
                     false => Class::PastOpenVertex,
                 }
+            } else if noise.edge_on {
+                // Turned rays may slip past it too, since all its edges lie in one line.
+                Class::PastEdgeOn
+            } else {
+                Class::Missed
             }
-            _ => Class::Missed,
         });
         Difference { class, ulps }
     }
