@@ -132,7 +132,10 @@ impl<'a> Closely<'a> {
         let of = |prim: PrimRef| {
             let corners = self.check.oracle.corners(prim)?;
             let [a, b, c] = corners;
-            if prim.geom_id != hit.prim.geom_id || !is_there(&prim, &corners) {
+            let normal = (b - a).cross(c - a);
+            // What rounding has made a line stops no ray at all.
+            let stops = prim.geom_id == hit.prim.geom_id && normal != DVec3::ZERO;
+            if !stops || !is_there(&prim, &corners) {
                 return None;
             }
             let sides = [(a, b), (b, c), (c, a)];
@@ -140,7 +143,7 @@ impl<'a> Closely<'a> {
             let near_sides = sides.iter().filter(|(from, to)| is_near(*from, *to)).count();
             let widest = sides.map(|(from, to)| (to - from).cross(dir).length());
             let widest = widest.into_iter().fold(0.0, f64::max);
-            let is_narrow = (b - a).cross(c - a).dot(dir).abs() <= 2.0 * noise * widest;
+            let is_narrow = normal.dot(dir).abs() <= 2.0 * noise * widest;
             let vertex = corners.iter().any(|corner| is_near(*corner, *corner));
             Some(Noise { vertex, edge_on: is_narrow || (near_sides > 1 && !vertex) })
         };

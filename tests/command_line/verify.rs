@@ -39,7 +39,7 @@ fn json_is_one_document_and_quiet_is_quiet() {
     assert_eq!(report["seed"], 3);
     assert_eq!(report["rays"]["vertex"], 100);
     let classes = report["classes"].as_array().expect("classes");
-    assert_eq!(classes.len(), 10);
+    assert_eq!(classes.len(), 11);
     assert_eq!(report["complete"], true);
     assert_eq!(report["past_vertex_limit"], 1e-3);
     assert_eq!(report["past_vertex_allowed"], 1);

@@ -47,9 +47,10 @@ pub fn open_meshes(size: Size) -> Outcome {
         outcome.check(ours.passed(), || format!("{name}: {:?}", ours.rows()));
         let without = tally(&scene, HitRules { retry: false, ..HitRules::default() }, rays);
         outcome.show(format!(
-            "{name}: {} unexplained, {passed} of {} past a vertex; without a second try {} unexplained",
+            "{name}: {} unexplained, {passed} of {} past a vertex, {} past triangles seen edge on; without a second try {} unexplained",
             ours.unexplained(),
             ours.rays(Kind::Vertex),
+            ours.count(Class::PastEdgeOn),
             without.unexplained()
         ));
         seen += u32::from(!without.passed());
