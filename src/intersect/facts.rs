@@ -95,12 +95,16 @@ mod tests {
     use crate::math::{DVec3, Rgb};
     use crate::scene::{Material, World, WorldMesh};
 
-    fn facts_of(triangles: Vec<[u32; 3]>) -> MeshFacts {
-        let positions = vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
+    fn facts_of_mesh(positions: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> MeshFacts {
         let mut world = World::default();
         world.materials.push(Material::diffuse("white", Rgb::ONE));
-        world.meshes.push(WorldMesh::new("tetrahedron", positions, triangles, 0));
+        world.meshes.push(WorldMesh::new("mesh", positions, triangles, 0));
         MeshFacts::of(&world.into_scene(false).expect("a scene").meshes[0])
+    }
+
+    /// The facts of some faces of a tetrahedron.
+    fn facts_of(triangles: Vec<[u32; 3]>) -> MeshFacts {
+        facts_of_mesh(vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z], triangles)
     }
 
     #[test]
@@ -118,12 +122,8 @@ mod tests {
 
     /// The facts of a mesh of loose triangles.
     fn facts_of_corners(corners: &[[DVec3; 3]]) -> MeshFacts {
-        let mut world = World::default();
-        world.materials.push(Material::diffuse("white", Rgb::ONE));
         let triangles = (0..corners.len() as u32).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect();
-        let positions = corners.as_flattened().to_vec();
-        world.meshes.push(WorldMesh::new("loose", positions, triangles, 0));
-        MeshFacts::of(&world.into_scene(false).expect("a scene").meshes[0])
+        facts_of_mesh(corners.as_flattened().to_vec(), triangles)
     }
 
     /// A strip around the y axis of so many quads, from the last one to `end`, which is the first again or differs a little.

@@ -214,7 +214,7 @@ impl<'a> Closely<'a> {
     /// The product says occluded, the oracle does not.
     pub fn false_shadow(&self) -> Difference {
         let none = Difference { class: Class::FalseShadow, ulps: f64::INFINITY };
-        self.near(2.0 * BAND_ULPS * self.largest_ulp())
+        self.near_band()
             .into_iter()
             .filter(|prim| *prim != self.ray.exclude)
             .filter(|prim| self.check.oracle.is_there(&self.ray, *prim))
@@ -254,10 +254,11 @@ impl<'a> Closely<'a> {
         if others.iter().any(|h| !self.pass(h.hit.prim).in_band()) {
             return None;
         }
+        // Mostly enough, and without a look at all triangles.
         if others.iter().all(|h| self.is_at_border(h.hit.prim)) {
             return Some(Class::EdgeBand);
         }
-        let near = self.near(2.0 * BAND_ULPS * self.largest_ulp());
+        let near = self.near_band();
         if others
             .iter()
             .all(|h| self.is_at_border(h.hit.prim) || self.ends_border(h.hit.prim, &near))
@@ -332,10 +333,12 @@ impl<'a> Closely<'a> {
         passed.any(|p| of_mesh().any(|other| ends_at(other, p)))
     }
 
-    /// One ulp of the largest coordinate of any triangle that there can be, or of the ray's start.
-    fn largest_ulp(&self) -> f64 {
+    /// Everything that passes the ray within twice the band, spheres included.
+    fn near_band(&self) -> Vec<PrimRef> {
+        // The largest ulp of any triangle that there can be.
         let largest = self.check.scene.bounds.largest_coordinate();
-        largest.max(self.line.start.abs().max_element()) * f64::from(f32::EPSILON)
+        let largest = largest.max(self.line.start.abs().max_element());
+        self.near(2.0 * BAND_ULPS * largest * f64::from(f32::EPSILON))
     }
 
     /// The triangles that pass the ray within `margin`, and all spheres.

@@ -17,7 +17,7 @@ pub const PAST_VERTEX_LIMIT: f64 = 1e-3;
 pub const OPEN_VERTEX_LIMIT: f64 = 0.03;
 
 /// Share of the rays aimed at edges that may slip past a triangle seen edge on ([`Class::PastEdgeOn`]): some times what was
-/// measured (up to 2 of 60,000 on open meshes).
+/// measured (a few in 100,000 on open meshes).
 pub const EDGE_ON_LIMIT: f64 = 1e-4;
 
 const KINDS: usize = Kind::ALL.len();
