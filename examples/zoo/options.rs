@@ -17,8 +17,18 @@ Columns, for each scene, then for each family:
   inferred      per cent of the points that were inferred: seen directly, then in mirrors and through glass
   speed         CPU seconds with --policy off over those with reuse; with 4 frames mostly noise
   audit         RMSE by the audit; ! if its interval of 95 % does not contain the true error
-  kept          frames without a tile worse than traced, and those without one that is worse beyond chance
-  CPU seconds   with reuse, and with --policy off";
+  kept          frames without a tile worse than traced, / those without one that is worse beyond chance (of a family \"strict\"
+                and \"kept\"), of how many
+  CPU seconds   with reuse, and with --policy off
+
+A trace is the same frame with --policy off; the truth is the mean of many, of other random numbers. The targets, and which
+are met, are printed last. Figures (zoo.json), scenes and pictures go to target/zoo/SEED. A scene of 4 frames takes some
+seconds, one of 48 frames a minute.
+
+Examples:
+  ./x zoo --seed 7 --count 5
+  ./x zoo --seed 7 --families forest,mirrors --settings 4,16 --check
+  ./x zoo --scene scene.toml --frames 48";
 
 /// Renders random scenes, or those given, and judges what was inferred.
 #[derive(Parser)]

@@ -5,11 +5,17 @@ use crate::output::manifest::AuditRow;
 use crate::reuse::audit::{Rmse, is_worse_than_traced, rmse};
 use crate::stats::AuditSums;
 
-/// The error of the inferred frames together; `None` where no pixel was drawn.
-pub fn error_of(audit: &AuditRow) -> Option<String> {
-    let ([rmse, low, high], [traced, ..]) = (audit.rmse?, audit.rmse_traced?);
+/// The error of the inferred frames together, where up to `tolerance` display steps are allowed; `None` where no pixel was
+/// drawn.
+pub fn error_of(audit: &AuditRow, tolerance: f32) -> Option<String> {
+    let ([rmse, low, high], [traced, _, traced_high]) = (audit.rmse?, audit.rmse_traced?);
+    let is_allowed = low > traced_high && low <= tolerance.into();
+    let allowed = match is_allowed {
+        true => format!(", within --tolerance {tolerance}"),
+        false => String::new(),
+    };
     Some(format!(
-        "inferred frames: RMSE {}/255 ({}–{}); tracing each frame: {}/255",
+        "inferred frames: RMSE {}/255 ({}–{}){allowed}; tracing each frame: {}/255",
         steps(rmse),
         steps(low),
         steps(high),
@@ -88,6 +94,24 @@ mod tests {
             traced: of(traced),
             ..AuditSums::default()
         }
+    }
+
+    /// Only what is certainly less accurate than a trace is said to be allowed.
+    #[test]
+    fn an_error_that_the_tolerance_allows_is_said_to_be() {
+        let told = |inferred: [f64; 3], tolerance| {
+            let (rmse, rmse_traced) = (Some(inferred), Some([1.2, 1.1, 1.3]));
+            let (rmse_inferred_pixels, sums) = (None, AuditSums::default());
+            let audit = AuditRow { rmse, rmse_inferred_pixels, rmse_traced, sums };
+            error_of(&audit, tolerance).expect("drawn pixels")
+        };
+        let traced = "; tracing each frame: 1.2/255";
+        let worse =
+            |allowed: &str| format!("inferred frames: RMSE 2.7/255 (2.1–3.9){allowed}{traced}");
+        assert_eq!(told([2.7, 2.1, 3.9], 20.0), worse(", within --tolerance 20"));
+        assert_eq!(told([2.7, 2.1, 3.9], 2.0), worse(""));
+        let alike = format!("inferred frames: RMSE 1.4/255 (1.2–1.7){traced}");
+        assert_eq!(told([1.4, 1.2, 1.7], 20.0), alike);
     }
 
     fn told(audits: &[AuditSums]) -> String {

@@ -90,6 +90,9 @@ pub fn run(args: &ReportArgs) -> Result<Exit> {
         let (count, size) = (job.standing.count(), words::bytes(html.len() as u64));
         let gaps: String = job.standing.gaps().iter().map(|gap| format!("\n  {gap}")).collect();
         say::result(format!("{} ({count}, {size}){gaps}", out.display()))?;
+        if let Some(worse) = job.worse_than_traced() {
+            say::warning(worse);
+        }
     }
     Ok(Exit::Done)
 }

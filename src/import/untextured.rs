@@ -4,6 +4,7 @@
 //! A warning, not an error: files whose materials name images for faces without coordinates are common,
 //! and the rest of the picture is right.
 
+use crate::error::counted;
 use crate::scene::{Material, TextureMap, World, WorldMesh};
 
 /// A mesh, and what its material shows and it lacks.
@@ -15,12 +16,14 @@ pub(super) struct Untextured {
     lacks: Lacking,
 }
 
-/// What a mesh lacks: coordinates for an image, by the name of its file (of a share, after the key that it is of), or colours.
+/// What a mesh lacks: coordinates for an image, by the name of its file (of a share, after the key that it is of), those of
+/// some of its triangles, or colours.
 enum Lacking {
     Texture(String),
     Mask(String),
     Share(&'static str, String),
     Normals(&'static str, String),
+    Part { bare: usize, all: usize },
     Colours,
 }
 
@@ -48,7 +51,10 @@ pub(super) fn find(world: &World, first: usize) -> impl Iterator<Item = Untextur
         let normals = normals.map(|(what, map)| Lacking::Normals(what, file(&map.image)));
         let normals: Vec<Lacking> = normals.collect();
         let (texture, mask) = (texture.map(Lacking::Texture), mask.map(Lacking::Mask));
-        let lacking = [texture, mask, emission, roughness, colours];
+        let lies_by_it = material.images().chain(&material.alpha).any(|map| map.uv_set == 0);
+        let part = Lacking::Part { bare: mesh.bare_triangles, all: mesh.triangles.len() };
+        let part = (mesh.bare_triangles > 0 && lies_by_it).then_some(part);
+        let lacking = [texture, mask, emission, roughness, part, colours];
         lacking
             .into_iter()
             .flatten()
@@ -87,6 +93,12 @@ impl Untextured {
             Lacking::Normals(_, file) => format!(
                 "the mesh `{mesh}` {none}: {file} of the material `{material}` tilts none of its normals"
             ),
+            Lacking::Part { bare, all } => format!(
+                "{bare} of {} of the mesh `{mesh}` {} no texture coordinates: of the material `{material}` they show one \
+                 colour, that of the lower left corner of its images",
+                counted(*all, "triangle"),
+                if *bare == 1 { "has" } else { "have" }
+            ),
             Lacking::Colours => format!(
                 "the mesh `{mesh}` has no vertex colours: the material `{material}` shows its own colour as it is"
             ),
@@ -95,11 +107,11 @@ impl Untextured {
 
     /// The help line.
     pub fn help(&self) -> String {
-        if self.has_others && !matches!(self.lacks, Lacking::Colours) {
+        if self.has_others && !matches!(self.lacks, Lacking::Part { .. } | Lacking::Colours) {
             return "say by `uv_set` which of its sets the image lies by: 0 is the first".into();
         }
         let help = match &self.lacks {
-            Lacking::Texture(_) => {
+            Lacking::Texture(_) | Lacking::Part { .. } => {
                 "write the mesh with texture coordinates (`vt` in obj, `s` and `t` in ply), or give it a \
                  material without a texture"
             }

@@ -95,12 +95,6 @@ impl Known {
     fn before(&self, ray: &Ray) -> Ray {
         Ray { tfar: self.hit.map_or(ray.tfar, |hit| hit.t), ..*ray }
     }
-
-    /// The hit of a further try, if it is nearer.
-    fn nearer(&self, again: &Located) -> Option<Hit> {
-        let is_nearer = self.hit.is_none_or(|hit| again.lies_before(hit.t));
-        is_nearer.then_some(again.hit)
-    }
 }
 
 /// How Embree sees a ray's direction: as it is, or turned by a few ulp to one side or the other.
@@ -259,7 +253,9 @@ impl<'s> EmbreeIntersector<'s> {
             return self.settle(ray, Some(prim), counts);
         };
         let along = candidate.hit.ng.as_dvec3().dot(ray.dir);
-        if !self.retries() || !self.is_doubtful(ray, prim, along) {
+        let is_doubtful =
+            || self.is_doubtful(ray, prim, along) || recheck::is_displaced(ray, &candidate, &hit);
+        if !self.retries() || !is_doubtful() {
             return Some(hit);
         }
         self.hit_before(ray, Known::of(hit), counts)
@@ -289,39 +285,49 @@ impl<'s> EmbreeIntersector<'s> {
         inside != back || (inside && perforated())
     }
 
-    /// The first true hit of `ray` that a `query` finds, which cannot hit the `passed` primitives; phantoms join these.
+    /// The first true hit of `ray` that a `query` finds, which cannot hit the passed primitives, if it is nearer than the
+    /// `known` one. Phantoms join those that were passed, and so do hits that are not nearer or that Embree displaced: it may
+    /// have taken a needle for nearer than what lies before it, and another one next.
     fn pursue(
         &self,
         ray: &Ray,
-        passed: &mut Vec<PrimRef>,
+        known: &mut Known,
         query: impl Fn(&[PrimRef]) -> Option<Candidate>,
-    ) -> Option<Located> {
-        while passed.len() < MOST_PHANTOMS {
-            let candidate = query(passed)?;
+    ) -> Option<Hit> {
+        let mut found = None;
+        while known.passed.len() < MOST_PHANTOMS {
+            let Some(candidate) = query(&known.passed) else { break };
+            let nearest = found.or(known.hit);
+            // All others lie behind it too.
+            if nearest.is_some_and(|hit| f64::from(candidate.hit.t) + candidate.shift > hit.t) {
+                break;
+            }
             // Judged by the ray that was asked for: the nudge is smaller than the tolerance.
             let located = self.locate(ray, &candidate);
-            if located.is_some() {
-                return located;
+            let is_nearer = |again: &Located| nearest.is_none_or(|hit| again.lies_before(hit.t));
+            if let Some(Located { hit, .. }) = located.filter(is_nearer) {
+                found = Some(hit);
+                if !recheck::is_displaced(ray, &candidate, &hit) {
+                    break;
+                }
             }
-            passed.push(candidate.hit.prim);
+            known.passed.push(candidate.hit.prim);
         }
-        None
+        found
     }
 
     /// The hit of a ray whose first query gave the phantom `phantom`, or nothing.
     #[cold]
     fn settle(&self, ray: &Ray, phantom: Option<PrimRef>, counts: &mut RayCounts) -> Option<Hit> {
-        let mut passed = Vec::from_iter(phantom);
-        let behind = phantom.and_then(|_| {
-            self.pursue(ray, &mut passed, |passed| self.query(ray, Turn::None, passed))
-        });
-        let hit = behind.map(|behind| behind.hit);
+        let mut known = Known { hit: None, passed: Vec::from_iter(phantom) };
+        let behind = |passed: &[PrimRef]| self.query(ray, Turn::None, passed);
+        let hit = phantom.and_then(|_| self.pursue(ray, &mut known, behind));
         // Embree hit the phantom in place of a triangle beside it: what lies behind is in doubt too.
         if !self.retries() || (hit.is_none() && !self.coarse.may_meet(&Bundle::of([ray])?)) {
             return hit;
         }
-        passed.extend(hit.map(|hit| hit.prim));
-        self.hit_before(ray, Known { hit, passed }, counts)
+        known.passed.extend(hit.map(|hit| hit.prim));
+        self.hit_before(ray, Known { hit, ..known }, counts)
     }
 
     /// The nearest hit: what further tries find before the `known` one, or that.
@@ -331,8 +337,7 @@ impl<'s> EmbreeIntersector<'s> {
         for turn in TURNS {
             counts[RayKind::Retry] += 1;
             let query = |passed: &[PrimRef]| self.query(&before, turn, passed);
-            let again = self.pursue(&before, &mut known.passed, query);
-            if let Some(nearer) = again.and_then(|again| known.nearer(&again)) {
+            if let Some(nearer) = self.pursue(&before, &mut known, query) {
                 return Some(nearer);
             }
         }
@@ -355,8 +360,7 @@ impl<'s> EmbreeIntersector<'s> {
             let (tnear, tfar) = (before.tnear - start, end.min(before.tfar) - start);
             let moved = Ray { org: before.at(start), tnear, tfar, ..before };
             let query = |passed: &[PrimRef]| self.query_as(&before, &moved, start, passed);
-            let again = self.pursue(&before, &mut known.passed, query);
-            if let Some(nearer) = again.and_then(|again| known.nearer(&again)) {
+            if let Some(nearer) = self.pursue(&before, &mut known, query) {
                 return Some(nearer);
             }
         }

@@ -35,7 +35,8 @@ struct Sums {
 
 /// A fingerprint of the edges of a triangle. An edge counts with the opposite sign if it runs the other way, so the
 /// fingerprints of a closed mesh add up to 0, and those of any other do so with a chance of about 2^-60. Vertices that are
-/// the same after adding and subtracting `coarse` are one: a seam's vertices may differ in the last bits.
+/// the same after adding and subtracting `coarse` are one: a seam's vertices may differ in the last bits, and few of these
+/// lie on either side of a rounding step.
 fn border(corners: [Vec3; 3], coarse: Vec3) -> u64 {
     let [a, b, c] = corners.map(|p| {
         let [x, y, z] = (p + coarse - coarse).to_array().map(|x| u64::from(x.to_bits()));

@@ -73,8 +73,8 @@ pub(super) fn meet_plane(ray: &Ray, corners: &[DVec3; 3]) -> Option<PlaneHit> {
     (t.is_finite() && u.is_finite() && v.is_finite()).then_some(PlaneHit { t, u, v })
 }
 
-/// `[t, u, v]`, not finite where the determinant is zero. The one formula of this file, so that
-/// one ray and many give the same bits.
+/// `[t, u, v]`, not finite where the determinant is zero or the triangle a line, but for rounding: then the determinant is
+/// noise. The one formula of this file, so that one ray and many give the same bits.
 #[inline(always)]
 fn meet(org: [f64; 3], dir: [f64; 3], a: [f64; 3], b: [f64; 3], c: [f64; 3]) -> [f64; 3] {
     let sub = |x: [f64; 3], y: [f64; 3]| [x[0] - y[0], x[1] - y[1], x[2] - y[2]];
@@ -84,10 +84,21 @@ fn meet(org: [f64; 3], dir: [f64; 3], a: [f64; 3], b: [f64; 3], c: [f64; 3]) -> 
     };
     let (e1, e2) = (sub(b, a), sub(c, a));
     let p = cross(dir, e2);
-    let inv = 1.0 / dot(e1, p);
+    let inv = if is_line(e1, e2) { f64::NAN } else { 1.0 / dot(e1, p) };
     let s = sub(org, a);
     let q = cross(s, e1);
     [dot(e2, q) * inv, dot(s, p) * inv, dot(dir, q) * inv]
+}
+
+/// Whether the normal of a triangle of these edges is no more than the rounding of its own terms.
+#[inline(always)]
+fn is_line(e1: [f64; 3], e2: [f64; 3]) -> bool {
+    let vanishes = |i: usize, j: usize| {
+        let (one, other) = (e1[i] * e2[j], e1[j] * e2[i]);
+        (one - other).abs() <= f64::EPSILON * (one.abs() + other.abs())
+    };
+    // Without branches, so that lanes are computed together.
+    vanishes(1, 2) & vanishes(2, 0) & vanishes(0, 1)
 }
 
 /// Pairs that are computed together: two SSE2 registers, one of AVX.
@@ -148,6 +159,21 @@ mod tests {
     use super::*;
 
     const UNIT: [DVec3; 3] = [DVec3::ZERO, DVec3::X, DVec3::Y];
+
+    /// Whatever is left of its normal is rounding, by which a ray would hit it anywhere.
+    #[test]
+    fn a_triangle_that_is_a_line_hits_nothing() {
+        let a = DVec3::new(0.125, 0.25, -0.375);
+        let b = a + DVec3::new(3.0, -2.5, 4.0) / 4.0;
+        for k in 1..64 {
+            let c = a + (b - a) * (f64::from(k) / 64.0);
+            let ray = Ray::new(DVec3::new(0.4, f64::from(k) * 0.01, -1.0), c - DVec3::Z);
+            assert_eq!(meet_plane(&ray, &[a, b, c]), None, "{k}");
+            // A thousandth of an ulp of f32 beside the line.
+            let sliver = [a, b, c + DVec3::new(6e-11, 6e-11, 0.0)];
+            assert!(meet_plane(&ray, &sliver).is_some(), "{k}");
+        }
+    }
 
     #[test]
     fn meets_the_known_point() {

@@ -32,6 +32,19 @@ pub fn proportion_upper_bound(found: u64, n: u64) -> f64 {
     inverse_beta(CONFIDENCE, found as f64 + 1.0, (n - found) as f64)
 }
 
+/// The number of independent rare events that is exceeded with a probability of at most `chance`, where `mean` are expected
+/// (Poisson).
+pub fn most_by_chance(mean: f64, chance: f64) -> u64 {
+    let exceeds = |most: u64| {
+        mean > 0.0 && checked_gamma_lr(most as f64 + 1.0, mean).is_ok_and(|p| p > chance)
+    };
+    let mut most = mean as u64;
+    while exceeds(most) {
+        most += 1;
+    }
+    most
+}
+
 /// How much more than the largest part that was drawn the largest one of all may be.
 ///
 /// Squared errors of pixels have long tails: a few hold most of the sum, and a sample that missed
@@ -91,6 +104,25 @@ mod tests {
 
     fn near(got: f64, expected: f64, tolerance: f64) {
         assert!((got - expected).abs() <= tolerance, "{got} against {expected}");
+    }
+
+    /// Sums of the Poisson distribution's terms.
+    #[test]
+    fn events_exceed_their_bound_by_chance_alone() {
+        for mean in [0.0f64, 0.1, 1.0, 7.5, 52.0] {
+            let above = |most: u64| {
+                let mut term = libm::exp(-mean);
+                let mut sum = term;
+                (1..=most).for_each(|k| {
+                    term *= mean / k as f64;
+                    sum += term;
+                });
+                1.0 - sum
+            };
+            let most = most_by_chance(mean, 1e-3);
+            assert!(above(most) <= 1e-3, "{mean}: {most}");
+            assert!(most == 0 || above(most - 1) > 1e-3, "{mean}: {most}");
+        }
     }
 
     #[test]

@@ -31,6 +31,8 @@ mod test_images;
 pub use compare::{Comparison, Exceeding, Space, Summary, compare, summarise};
 pub use error_metrics::{LargestError, largest_error, mse, psnr, share_exceeding};
 pub use flip::{PIXELS_PER_DEGREE, flip, flip_map};
-pub use intervals::{CONFIDENCE, Interval, drawn_sum_interval, proportion_upper_bound};
+pub use intervals::{
+    CONFIDENCE, Interval, drawn_sum_interval, most_by_chance, proportion_upper_bound,
+};
 pub use median::{Median, median};
 pub use ssim::{ssim, ssim_blocks};

@@ -188,7 +188,7 @@ fn refusal(pattern: &FramePattern, header: &Header, holder: Option<&Holder>) -> 
     };
     Error::Usage(format!(
         "{} is being rendered by {why}\n  \
-         help: wait for that job or stop it, or choose another output with -o",
+         help: choose another output with -o, or replace that job's frames with --overwrite once it has ended",
         pattern
     ))
 }

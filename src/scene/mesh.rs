@@ -68,6 +68,8 @@ pub struct WorldMesh {
     pub normals: Option<Corners<Vec3>>,
     /// Texture coordinates, origin at the image's lower left: set number 0.
     pub uvs: Option<Corners<Vec2>>,
+    /// Triangles that the mesh's file gives no texture coordinates, though it gives some to others: they have (0, 0).
+    pub bare_triangles: usize,
     /// Further sets of texture coordinates, from number 1 on; `None` is one that the mesh lacks.
     pub more_uvs: Vec<Option<Corners<Vec2>>>,
     /// A colour for each position, which its material may show.
@@ -93,6 +95,7 @@ impl WorldMesh {
             triangles,
             normals: None,
             uvs: None,
+            bare_triangles: 0,
             more_uvs: Vec::new(),
             colours: None,
             material,

@@ -158,6 +158,7 @@ fn to_scene_mesh(mesh: WorldMesh, materials: &[Material], r: &Recentring) -> (Me
         colours,
         material,
         always_traced,
+        bare_triangles: _,
     } = mesh;
     let made_of = &materials[material as usize];
     let colours = colours.filter(|_| made_of.vertex_colours);

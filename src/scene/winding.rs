@@ -9,9 +9,8 @@ use std::collections::HashMap;
 /// edge has not exactly two triangles, or the part is one-sided.
 pub(super) fn strays(positions: &[DVec3], triangles: &[[u32; 3]]) -> Option<Vec<bool>> {
     let welded = welded(positions, triangles);
-    let solid = |t: &[u32; 3]| t[0] != t[1] && t[1] != t[2] && t[2] != t[0];
     let mut edges: HashMap<(u32, u32), Vec<(u32, bool)>> = HashMap::new();
-    for (index, t) in welded.iter().enumerate().filter(|(_, t)| solid(t)) {
+    for (index, t) in welded.iter().enumerate().filter(|(_, t)| is_solid(t)) {
         for (a, b) in [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])] {
             edges.entry((a.min(b), a.max(b))).or_default().push((index as u32, a < b));
         }
@@ -21,7 +20,7 @@ pub(super) fn strays(positions: &[DVec3], triangles: &[[u32; 3]]) -> Option<Vec<
     }
     let mut reversed: Vec<Option<bool>> = vec![None; triangles.len()];
     for start in 0..triangles.len() {
-        if reversed[start].is_none() && solid(&welded[start]) {
+        if reversed[start].is_none() && is_solid(&welded[start]) {
             orient_part(positions, triangles, &welded, &edges, &mut reversed, start)?;
         }
     }
@@ -66,6 +65,11 @@ fn orient_part(
         part.iter().for_each(|i| reversed[*i] = reversed[*i].map(|r| !r));
     }
     Some(())
+}
+
+/// Whether a triangle of welded vertices has three of them: rounding may have made it a line.
+fn is_solid(t: &[u32; 3]) -> bool {
+    t[0] != t[1] && t[1] != t[2] && t[2] != t[0]
 }
 
 /// `triangles` with the first vertex at each place in the stead of all others there.
@@ -113,13 +117,15 @@ pub(crate) fn borders(positions: &[DVec3], triangles: &[[u32; 3]]) -> Vec<u8> {
         [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])].map(|(a, b)| (a.min(b), a.max(b)))
     };
     let mut uses = HashMap::with_capacity(triangles.len() * 3);
-    for edge in welded.iter().flat_map(edges_of) {
+    for edge in welded.iter().filter(|t| is_solid(t)).flat_map(edges_of) {
         *uses.entry(edge).or_insert(0u32) += 1;
     }
-    let bits = |t: &[u32; 3]| {
-        // A triangle that rounding has made a line has an edge from a vertex to itself.
-        let alone = edges_of(t).map(|(a, b)| u8::from(a != b && uses[&(a, b)] == 1));
-        alone[0] | alone[1] << 1 | alone[2] << 2
+    let bits = |t: &[u32; 3]| match is_solid(t) {
+        true => {
+            let alone = edges_of(t).map(|edge| u8::from(uses[&edge] == 1));
+            alone[0] | alone[1] << 1 | alone[2] << 2
+        }
+        false => 0,
     };
     welded.iter().map(bits).collect()
 }
@@ -159,6 +165,8 @@ mod tests {
         assert_eq!(borders(&corners(), &TETRAHEDRON[..3]), [1, 4, 2]);
         let with_a_line: Vec<[u32; 3]> = TETRAHEDRON.into_iter().chain([[0, 0, 1]]).collect();
         assert_eq!(borders(&corners(), &with_a_line), [0; 5]);
+        let open = [&TETRAHEDRON[..3], &[[2, 2, 3]]].concat();
+        assert_eq!(borders(&corners(), &open), [1, 4, 2, 0]);
     }
 
     #[test]

@@ -160,6 +160,7 @@ impl Hash {
             colours,
             material: _,
             always_traced: _,
+            bare_triangles: _,
         } = mesh;
         self.array(positions);
         self.array(triangles);

@@ -35,7 +35,7 @@ pub struct Survey {
 }
 
 /// The state of the frames in the manifest at `path`. `range` returns the frames to look at, from the
-/// number of frames of the shot.
+/// number of frames of the shot; of a file for a single frame, whose name has no number, only that frame is looked at.
 ///
 /// Errors: there is no manifest, or it cannot be read; errors of `range`.
 pub fn survey(path: &Path, range: impl Fn(u32) -> Result<FrameRange>) -> Result<Survey> {
@@ -53,7 +53,8 @@ pub fn survey_of(
     range: impl Fn(u32) -> Result<FrameRange>,
 ) -> Result<Survey> {
     let folder = folder_of(path);
-    let FrameRange { first, last } = range(manifest.header.shot_frames)?;
+    let asked = range(manifest.header.shot_frames)?;
+    let FrameRange { first, last } = single_frame(manifest, asked).unwrap_or(asked);
     let files = folder.join(&manifest.header.files).display().to_string();
     let pattern = FramePattern::parse(&files, last - first + 1)?;
     let stand = |frame| Ok((frame, state_of(&pattern, folder, frame, manifest)?));
@@ -79,6 +80,15 @@ pub fn survey_of(
         other_move: all(FrameState::Foreign(Foreign::OtherMove)),
         beyond: beyond.filter(is_there).map(|row| row.frame).collect(),
     })
+}
+
+/// The frame of a sequence whose file's name has no number, if it is among those that are `asked` about.
+fn single_frame(manifest: &Manifest, asked: FrameRange) -> Option<FrameRange> {
+    if manifest.header.files.contains('#') {
+        return None;
+    }
+    let frame = *manifest.rows.range(asked.first..=asked.last).next()?.0;
+    Some(FrameRange { first: frame, last: frame })
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]

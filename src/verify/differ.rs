@@ -22,6 +22,20 @@ struct Noise {
     edge_on: bool,
 }
 
+/// Bound of that rounding, scene space, for a ray that starts at `start`, near a hit at `at`.
+pub(super) fn edge_noise(start: DVec3, at: DVec3) -> f64 {
+    EDGE_NOISE * f64::from(f32::EPSILON) * (start.length() + (at - start).length())
+}
+
+/// Whether a ray along the unit `dir` sees the triangle edge on: narrower than `noise` on either side.
+pub(super) fn is_narrow(corners: &[DVec3; 3], dir: DVec3, noise: f64) -> bool {
+    let [a, b, c] = *corners;
+    let normal = (b - a).cross(c - a);
+    let sides = [b - a, c - b, a - c];
+    let widest = sides.map(|side| side.cross(dir).length()).into_iter().fold(0.0, f64::max);
+    normal.dot(dir).abs() <= 2.0 * noise * widest
+}
+
 /// A ray with its line, and the scene to look it up in.
 pub struct Closely<'a> {
     check: &'a Check<'a>,
@@ -105,7 +119,7 @@ impl<'a> Closely<'a> {
         } else if apart < 0.0 {
             Some(self.extra(&pass))
         } else {
-            Some(self.missed(hit.t - pass.along() / length, &true_hit, Some(hit.prim)))
+            Some(self.missed(hit.t - pass.depth() / length, &true_hit, Some(hit.prim)))
         }
     }
 
@@ -117,17 +131,15 @@ impl<'a> Closely<'a> {
     fn noise_at(&self, hit: &Hit) -> Noise {
         let dir = self.ray.dir.normalize();
         let depth = self.pass(hit.prim).depth();
-        let reach = self.line.start.length() + (self.ray.at(hit.t) - self.line.start).length();
-        let noise = EDGE_NOISE * f64::from(f32::EPSILON) * reach;
+        let noise = edge_noise(self.line.start, self.ray.at(hit.t));
         let is_there = |prim: &PrimRef, [a, b, c]: &[DVec3; 3]| {
             let pass = self.pass(*prim);
             let all = [a, b, c].map(|p| (*p - self.ray.at(hit.t)).dot(dir));
-            // In its own plane the ray meets a triangle anywhere between its corners.
-            let apart = pass.t.map_or_else(
-                || all.into_iter().fold(f64::INFINITY, |least, along| least.min(along.abs())),
-                |t| (t - hit.t).abs() * self.ray.dir.length(),
-            );
-            apart <= depth + pass.depth()
+            // Seen edge on, its plane is met anywhere, but the triangle only between its corners.
+            let spans =
+                all.iter().any(|along| *along <= depth) && all.iter().any(|along| *along >= -depth);
+            let apart = |t: f64| (t - hit.t).abs() * self.ray.dir.length();
+            spans && pass.t.is_none_or(|t| apart(t) <= depth + pass.depth())
         };
         let of = |prim: PrimRef| {
             let corners = self.check.oracle.corners(prim)?;
@@ -141,9 +153,7 @@ impl<'a> Closely<'a> {
             let sides = [(a, b), (b, c), (c, a)];
             let is_near = |from, to| self.line.segment_distance(from, to) <= noise;
             let near_sides = sides.iter().filter(|(from, to)| is_near(*from, *to)).count();
-            let widest = sides.map(|(from, to)| (to - from).cross(dir).length());
-            let widest = widest.into_iter().fold(0.0, f64::max);
-            let is_narrow = normal.dot(dir).abs() <= 2.0 * noise * widest;
+            let is_narrow = is_narrow(&corners, dir, noise);
             let vertex = corners.iter().any(|corner| is_near(*corner, *corner));
             Some(Noise { vertex, edge_on: is_narrow || (near_sides > 1 && !vertex) })
         };

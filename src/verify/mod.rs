@@ -14,7 +14,9 @@ mod tally;
 
 pub use class::{BAND_ULPS, Class, Difference};
 pub use rays::{Kind, RayId};
-pub use tally::{ClassRow, EDGE_ON_LIMIT, OPEN_VERTEX_LIMIT, PAST_VERTEX_LIMIT, Tally, Worst};
+pub use tally::{
+    ClassRow, EDGE_ON_LIMIT, NARROW_LIMIT, OPEN_VERTEX_LIMIT, PAST_VERTEX_LIMIT, Tally, Worst,
+};
 
 use crate::intersect::{CourtHit, Hit, Intersector, Oracle, PrimRef, Ray};
 use crate::math::DVec3;
@@ -183,6 +185,9 @@ impl<'a> Check<'a> {
             }
             if index < rays {
                 tally.add(RayId { kind, index }, self.judge(&trial));
+                if kind == Kind::Edge && self.sees_edge_on(index) {
+                    tally.note_edge_on();
+                }
             }
         }
         Some(tally)

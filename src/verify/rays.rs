@@ -1,6 +1,7 @@
 //! The rays: six kinds, each ray a function of seed, kind and index.
 
 use super::Check;
+use super::differ::{edge_noise, is_narrow};
 use crate::intersect::{Hit, PrimRef, Ray, SurfaceInteraction};
 use crate::math::DVec3;
 use crate::sampling::mix;
@@ -125,15 +126,29 @@ impl Check<'_> {
                 let corners = self.triangle(rng)?;
                 self.ray_at(corners[rng.random_range(0..3)], rng)?
             }
-            Kind::Edge if id.index % 3 == 2 => self.grazing_ray(rng)?,
-            Kind::Edge => {
-                let corners = self.triangle(rng)?;
-                let first = rng.random_range(0..3);
-                let (a, b) = (corners[first], corners[(first + 1) % 3]);
-                self.ray_at(a + (b - a) * rng.random::<f64>(), rng)?
-            }
+            Kind::Edge => self.edge_ray(id.index, rng)?.0,
         };
         ray.is_valid().then_some(ray)
+    }
+
+    /// Whether the edge ray of this number sees the triangle at which it is aimed edge on.
+    pub(super) fn sees_edge_on(&self, index: u64) -> bool {
+        let id = RayId { kind: Kind::Edge, index };
+        let aimed = self.edge_ray(index, &mut random(self.settings.seed, id));
+        aimed.is_some_and(|(ray, corners)| {
+            is_narrow(&corners, ray.dir.normalize(), edge_noise(ray.org, corners[0]))
+        })
+    }
+
+    /// A ray at a point of an edge, and the triangle of that edge.
+    fn edge_ray(&self, index: u64, rng: &mut Pcg64) -> Option<(Ray, [DVec3; 3])> {
+        if index % 3 == 2 {
+            return self.grazing_ray(rng);
+        }
+        let corners = self.triangle(rng)?;
+        let first = rng.random_range(0..3);
+        let (a, b) = (corners[first], corners[(first + 1) % 3]);
+        Some((self.ray_at(a + (b - a) * rng.random::<f64>(), rng)?, corners))
     }
 
     fn camera_ray(&self, rng: &mut Pcg64) -> Option<Ray> {
@@ -184,7 +199,7 @@ impl Check<'_> {
     }
 
     /// Nearly in the plane of the thinnest of a few triangles, through a point of its rim.
-    fn grazing_ray(&self, rng: &mut Pcg64) -> Option<Ray> {
+    fn grazing_ray(&self, rng: &mut Pcg64) -> Option<(Ray, [DVec3; 3])> {
         let mut thinnest = self.triangle(rng)?;
         for _ in 1..CANDIDATES {
             let other = self.triangle(rng)?;
@@ -198,7 +213,7 @@ impl Check<'_> {
         let along = (c - a) * rng.random_range(-1.0..1.0) + (b - a) * rng.random_range(-1.0..1.0);
         let along = along.try_normalize()? + normal * rng.random_range(-GRAZING..GRAZING);
         let distance = self.scene.bounds.radius() * rng.random_range(0.01..1.5);
-        Some(Ray::new(target - along * distance, along))
+        Some((Ray::new(target - along * distance, along), thinnest))
     }
 
     fn mirror_ray(&self, rng: &mut Pcg64) -> Option<Ray> {

@@ -2,7 +2,7 @@
 
 use super::class::{Class, Difference};
 use super::rays::{Kind, RayId};
-use crate::measure::proportion_upper_bound;
+use crate::measure::{most_by_chance, proportion_upper_bound};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -17,8 +17,15 @@ pub const PAST_VERTEX_LIMIT: f64 = 1e-3;
 pub const OPEN_VERTEX_LIMIT: f64 = 0.03;
 
 /// Share of the rays aimed at edges that may slip past a triangle seen edge on ([`Class::PastEdgeOn`]): some times what was
-/// measured (a few in 100,000 on open meshes).
+/// measured (a few in 100,000 on open meshes without slivers).
 pub const EDGE_ON_LIMIT: f64 = 1e-4;
+
+/// Share of the rays aimed at a triangle that they see edge on that may slip past one as well: twice what was measured (0.6 to
+/// 2.5 % where slivers close T-junctions or fill flat polygons).
+pub const NARROW_LIMIT: f64 = 0.05;
+
+/// One job in so many of a mesh whose rays slip past it just as often as they may exceeds what is allowed.
+const CHANCE: f64 = 1e-3;
 
 const KINDS: usize = Kind::ALL.len();
 const CLASSES: usize = Class::ALL.len();
@@ -27,6 +34,8 @@ const CLASSES: usize = Class::ALL.len();
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Tally {
     rays: [u64; KINDS],
+    /// Edge rays that see the triangle at which they are aimed edge on.
+    edge_on: u64,
     found: [[u64; CLASSES]; KINDS],
     worst: [Option<Worst>; CLASSES],
 }
@@ -69,7 +78,13 @@ impl Tally {
         }
     }
 
+    /// Notes that the last edge ray sees the triangle at which it is aimed edge on.
+    pub(super) fn note_edge_on(&mut self) {
+        self.edge_on += 1;
+    }
+
     pub(super) fn with(mut self, other: Self) -> Self {
+        self.edge_on += other.edge_on;
         for kind in 0..KINDS {
             self.rays[kind] += other.rays[kind];
             for class in 0..CLASSES {
@@ -114,9 +129,17 @@ impl Tally {
         ((OPEN_VERTEX_LIMIT * self.rays(Kind::Vertex) as f64) as u64).max(1)
     }
 
-    /// How many may be [`Class::PastEdgeOn`]: [`EDGE_ON_LIMIT`] of the edge rays, but one at least.
+    /// Edge rays that see the triangle at which they are aimed edge on.
+    pub fn edge_on(&self) -> u64 {
+        self.edge_on
+    }
+
+    /// How many may be [`Class::PastEdgeOn`]: [`EDGE_ON_LIMIT`] of the edge rays and [`NARROW_LIMIT`] of those that see the
+    /// triangle at which they are aimed edge on, and what chance adds.
     pub fn edge_on_allowed(&self) -> u64 {
-        ((EDGE_ON_LIMIT * self.rays(Kind::Edge) as f64) as u64).max(1)
+        let mean =
+            EDGE_ON_LIMIT * self.rays(Kind::Edge) as f64 + NARROW_LIMIT * self.edge_on as f64;
+        most_by_chance(mean, CHANCE)
     }
 
     /// Whether every difference is explained, and no limit exceeded.
@@ -169,7 +192,7 @@ mod tests {
     fn more_past_a_vertex_than_the_limit_fails() {
         let vertex = [(Class::PastVertex, 4), (Class::PastOpenVertex, 122)];
         let limits = vertex.map(|(class, allowed)| (class, Kind::Vertex, allowed));
-        for (class, kind, allowed) in limits.into_iter().chain([(Class::PastEdgeOn, Kind::Edge, 1)])
+        for (class, kind, allowed) in limits.into_iter().chain([(Class::PastEdgeOn, Kind::Edge, 3)])
         {
             let with = |slipped: u64| {
                 let mut tally = Tally::default();

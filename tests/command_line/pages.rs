@@ -118,6 +118,25 @@ fn a_report_of_a_single_frame_says_so() {
     assert!(says(&text(&job, "o/f.report.html"), "only frame"));
 }
 
+/// A file without a number in its name is whole once its only frame is there, however long the move is.
+#[test]
+fn a_look_at_one_frame_of_a_move_is_complete() {
+    let job = Job::new();
+    let line = "render scene.toml --size 24x16 --spp 1 -q -o o/look.png";
+    job.done(&format!("{line} --frames 2"));
+    for asked in ["o", "o/look.png", "o --frames 2"] {
+        let ran = job.done(&format!("status {asked}"));
+        assert!(ran.out.starts_with("o/look.png: complete, 1 of 1 frame done"), "{}", ran.out);
+    }
+    let other = job.run("status o --frames 3");
+    assert_eq!(other.code, Some(3), "{}", other.out);
+    assert!(job.done("report o").out.starts_with("o/look.report.html (1 of 1 frame, "));
+    assert!(says(&text(&job, "o/look.report.html"), "only frame"));
+    std::fs::remove_file(job.path("o/look.png")).expect("there");
+    let gone = job.run("status o");
+    assert!(gone.out.contains("1 missing: 2") && gone.code == Some(3), "{}", gone.out);
+}
+
 /// What is said of a manifest that nobody can read is of use to whom it is said.
 #[test]
 fn a_truncated_manifest_is_refused_with_help() {

@@ -312,7 +312,7 @@ fn inferred_frames_that_are_less_accurate_than_traced_ones_are_named() {
         kept.err
     );
     assert!(kept.err.contains(worse) && kept.err.contains("--policy off"), "{}", kept.err);
-    job.done("report o -o p.html -q");
+    assert!(job.done("report o -o p.html").err.contains("warning: inferred frames"));
     let page = String::from_utf8(job.read("p.html")).expect("UTF-8");
     assert!(says(&page, "Warning … inferred frames … 3, 7 … <code>--policy</code> off"));
     let strict = job.run(&format!("{line} --strict"));

@@ -31,9 +31,13 @@ fn row(text: &mut String, name: &str, told: &[&Told]) {
     let speeds: Vec<f64> = told.iter().map(|t| t.speed).collect();
     let seconds = |job: usize| told.iter().map(|t| t.cpu_seconds[job]).sum::<f64>();
     let worst = db.iter().copied().fold(f64::INFINITY, f64::min);
+    let share = match shares.is_empty() {
+        true => "-".to_string(),
+        false => format!("{:.0}", 100.0 * median(&shares)),
+    };
     let _ = writeln!(
         text,
-        "{name:15} {:6} {:6}  {:6}  {:4}  {worst:+9.2}  {:+6.2}  {tile:>10}  {:4.2} {:4.2}  {:5.0}  {:6.2} {:7.1}/{:.1}",
+        "{name:15} {:6} {:6}  {:6}  {:4}  {worst:+9.2}  {:+6.2}  {tile:>10}  {:4.2} {:4.2}  {share:>5}  {:6.2} {:7.1}/{:.1}",
         told.len(),
         frames.len(),
         kept(|f| f.keeps_strictly),
@@ -41,7 +45,6 @@ fn row(text: &mut String, name: &str, told: &[&Told]) {
         median(&db),
         median(&flicker),
         flicker.iter().copied().fold(0.0, f64::max),
-        100.0 * median(&shares),
         median(&speeds),
         seconds(0),
         seconds(1),

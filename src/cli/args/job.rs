@@ -22,7 +22,7 @@ pub struct JobArgs {
     #[arg(long)]
     pub overwrite: bool,
     /// Fail (exit code 1, frames written) where a sample is NaN, infinite or negative, or where inferred
-    /// frames are less accurate than traced ones
+    /// frames are less accurate than traced ones and off by more than --tolerance
     #[arg(long)]
     pub strict: bool,
     /// Make no video of the sequence

@@ -85,7 +85,8 @@ fn finish(job: &RenderJob, round: &Round) -> Result<Exit> {
     let policy = job.setup.settings.reuse.policy;
     reused(policy, &stats::reuse_of(outcome)).map_or(Ok(()), result)?;
     let audit = stats::audit_of(plan, outcome);
-    if let Some(line) = audit.and_then(|audit| error_of(&audit)) {
+    let tolerance = job.setup.settings.reuse.tolerance;
+    if let Some(line) = audit.and_then(|audit| error_of(&audit, tolerance)) {
         result(line)?;
     }
     if job.request.options.video {

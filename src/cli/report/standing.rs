@@ -22,7 +22,7 @@ impl Standing {
     pub fn new(mut survey: Survey, manifest: &Manifest) -> Self {
         let is_known = |frame: &u32| manifest.rows.contains_key(frame);
         let made = manifest.rows.values().filter(|row| row.stray.is_none());
-        let made = made.filter(|row| row.frame <= survey.total).count();
+        let made = made.filter(|row| row.frame <= manifest.header.shot_frames).count();
         // A running job puts a frame in its place before it says so in the manifest.
         let (damaged, unknown) = survey.damaged.iter().copied().partition(is_known);
         survey.damaged = damaged;
@@ -70,7 +70,7 @@ impl Job {
         let all = counted(survey.total as usize, "frame");
         if survey.complete {
             return match survey.total {
-                1 => "The move's only frame is there.".into(),
+                1 => "The only frame is there.".into(),
                 _ => format!("All {all} of the move are there."),
             };
         }

@@ -4,8 +4,8 @@ use super::{VerifyArgs, replay_command};
 use crate::cli::say;
 use crate::error::Result;
 use crate::verify::{
-    BAND_ULPS, Check, Class, ClassRow, EDGE_ON_LIMIT, Kind, OPEN_VERTEX_LIMIT, PAST_VERTEX_LIMIT,
-    Tally,
+    BAND_ULPS, Check, Class, ClassRow, EDGE_ON_LIMIT, Kind, NARROW_LIMIT, OPEN_VERTEX_LIMIT,
+    PAST_VERTEX_LIMIT, Tally,
 };
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -31,8 +31,11 @@ struct Report {
     /// The same for vertices of open meshes.
     open_vertex_limit: f64,
     open_vertex_allowed: u64,
-    /// The same for triangles seen edge on, of the edge rays.
+    /// The same for triangles seen edge on: a share of the edge rays, and one of those that see the triangle at which they are
+    /// aimed edge on.
     edge_on_limit: f64,
+    edge_on_rays: u64,
+    edge_on_rays_limit: f64,
     edge_on_allowed: u64,
     classes: Vec<ClassReport>,
 }
@@ -66,6 +69,8 @@ pub fn print(args: &VerifyArgs, check: &Check, tally: &Tally, complete: bool) ->
         open_vertex_limit: OPEN_VERTEX_LIMIT,
         open_vertex_allowed: tally.open_vertex_allowed(),
         edge_on_limit: EDGE_ON_LIMIT,
+        edge_on_rays: tally.edge_on(),
+        edge_on_rays_limit: NARROW_LIMIT,
         edge_on_allowed: tally.edge_on_allowed(),
         classes: classes.collect(),
     };
@@ -135,8 +140,12 @@ impl Report {
                 text,
                 "\nFAILED: too many rays slipped through; the limits are {} past vertices of closed meshes \
                  ({PAST_VERTEX_LIMIT} of the vertex rays), {} past those of open ones ({OPEN_VERTEX_LIMIT}) and {} past \
-                 triangles seen edge on ({EDGE_ON_LIMIT} of the edge rays)",
-                self.past_vertex_allowed, self.open_vertex_allowed, self.edge_on_allowed
+                 triangles seen edge on ({EDGE_ON_LIMIT} of the edge rays, {NARROW_LIMIT} of the {} that are aimed at such \
+                 triangles, and chance)",
+                self.past_vertex_allowed,
+                self.open_vertex_allowed,
+                self.edge_on_allowed,
+                self.edge_on_rays
             ),
             n => writeln!(text, "\nFAILED: {n} unexplained"),
         };

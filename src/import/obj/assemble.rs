@@ -272,9 +272,11 @@ impl Builder {
         });
         let positions = tidy::compact(&mut values.positions, &mut v, *only_one, scratch);
         let attribute = |corners: Vec<[u32; 3]>| (corners != v).then_some(corners);
+        let mut bare_triangles = 0;
         let uvs = vt.and_then(|mut vt| {
             let missing = values.uvs.len() as u32 - 1;
             vt.iter().flatten().any(|i| *i != missing).then(|| {
+                bare_triangles = vt.iter().filter(|t| t.contains(&missing)).count();
                 let values = tidy::compact(&mut values.uvs, &mut vt, *only_one, scratch);
                 Corners { values, corners: attribute(vt) }
             })
@@ -287,7 +289,8 @@ impl Builder {
             })
         });
         let colours = colours.and_then(known_colours);
-        Some(WorldMesh { normals, uvs, colours, ..WorldMesh::new("", positions, v, 0) })
+        let mesh = WorldMesh::new("", positions, v, 0);
+        Some(WorldMesh { normals, uvs, bare_triangles, colours, ..mesh })
     }
 }
 

@@ -85,8 +85,8 @@ pub(super) struct Settings {
     crop: Option<At<List<Corner, 4>>>,
     /// Show pixels with a sample that is NaN, infinite or negative in magenta.
     flag_bad: bool,
-    /// Whether such a sample, or inferred frames less accurate than traced ones, make the job fail (its frames are
-    /// written).
+    /// Whether such a sample, or inferred frames that are less accurate than traced ones and off by more than the
+    /// tolerance, make the job fail (its frames are written).
     strict: bool,
     /// First and last frame to render, as `[first, last]`, counted from 1. Absent: all.
     frames: Option<At<List<Int<1, 1_000_000>, 2>>>,

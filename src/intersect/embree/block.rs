@@ -2,7 +2,7 @@
 
 use super::super::coarse::Bundle;
 use super::super::triangle::{Pairs, STEP};
-use super::recheck::is_risky;
+use super::recheck::{is_displaced, is_risky};
 use super::{BLOCK, Candidate, EmbreeIntersector, Known, ROUNDING, TURNS, Turn};
 use crate::embree::{CastRays, Packet, PacketHit, QueryFlags};
 use crate::math::Vec3;
@@ -74,8 +74,15 @@ impl EmbreeIntersector<'_> {
             }
         }
         let block = Block { rays, shifts: &shifts, found: &found };
-        for lane in each(self.recheck_block(&block, hit, at_once, hits)) {
+        let (open, displaced) = self.recheck_block(&block, hit, at_once, hits);
+        for lane in each(open) {
             hits[lane] = self.settle(&rays[lane], Some(found[lane].prim), counts);
+        }
+        if self.retries() {
+            for lane in each(displaced) {
+                let known = hits[lane].map_or_else(Known::default, Known::of);
+                hits[lane] = self.hit_before(&rays[lane], known, counts);
+            }
         }
     }
 
@@ -265,14 +272,14 @@ impl EmbreeIntersector<'_> {
     }
 
     /// Writes the hits of the lanes `hit`, those of `at_once` rechecked, many together; returns the lanes whose
-    /// hit may be a phantom.
+    /// hit may be a phantom, and those whose hit Embree displaced ([`is_displaced`]).
     fn recheck_block(
         &self,
         block: &Block,
         hit: Lanes,
         at_once: Lanes,
         hits: &mut [Option<Hit>],
-    ) -> Lanes {
+    ) -> (Lanes, Lanes) {
         let Block { rays, shifts, found } = *block;
         for lane in each(hit & !at_once) {
             hits[lane] = Some(self.as_it_is(&found[lane], shifts[lane]));
@@ -280,7 +287,7 @@ impl EmbreeIntersector<'_> {
         let mut lanes = [0u8; BLOCK];
         let mut corners = [[0u32; 3]; BLOCK];
         let mut wanted = 0;
-        let mut open = 0;
+        let (mut open, mut displaced) = (0, 0);
         // Indices first, then vertices: so the processor waits for many cache misses at a time.
         for lane in each(hit & at_once) {
             let prim = found[lane].prim;
@@ -310,9 +317,13 @@ impl EmbreeIntersector<'_> {
                         self.recheck(ray, &Candidate { hit: found[lane], shift: shifts[lane] });
                     open |= Lanes::from(hits[lane].is_none()) << lane;
                 }
+                let candidate = Candidate { hit: found[lane], shift: shifts[lane] };
+                let is_displaced =
+                    hits[lane].is_some_and(|hit| is_displaced(ray, &candidate, &hit));
+                displaced |= Lanes::from(is_displaced) << lane;
             }
         }
-        open
+        (open, displaced)
     }
 }
 

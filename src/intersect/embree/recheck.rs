@@ -92,6 +92,15 @@ pub(super) fn is_risky(ray: &Ray, hit: &PacketHit, area: f64, edge: f64) -> bool
     !is_safe
 }
 
+/// Whether Embree took the hit for so much nearer than it is that what lies between was not looked at: in f32 the place of
+/// a needle's plane is noise.
+#[inline(always)]
+pub(super) fn is_displaced(ray: &Ray, candidate: &Candidate, hit: &Hit) -> bool {
+    let (length, t) = (ray.dir.length(), f64::from(candidate.hit.t));
+    let reach = ray.at(candidate.shift).length() + t * length;
+    (hit.t - candidate.shift - t) * length > 32.0 * ROUNDING * reach
+}
+
 /// Where a ray that meets its triangle's plane at `met`, outside, is nearest to the triangle, if that
 /// is within the edge band, and what the band comes to along the ray. `None` for a phantom. The ray's
 /// origin was moved by `shift` along it.

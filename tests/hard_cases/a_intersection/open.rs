@@ -17,7 +17,7 @@ use tweenray::verify::{Check, Class, Kind, OPEN_VERTEX_LIMIT, Tally};
 type Make = fn() -> WorldMesh;
 
 /// The open meshes by name, each within some units of the origin.
-const MESHES: [(&str, Make); 13] = [
+const MESHES: [(&str, Make); 19] = [
     ("field with holes", || thinned(sheet(), |k| suite::rng(63, k).random_ratio(9, 10))),
     ("cut sphere", || cut(false)),
     ("cut sphere, inside out", || cut(true)),
@@ -27,7 +27,13 @@ const MESHES: [(&str, Make); 13] = [
     ("sheet with two sides", two_sided),
     ("T-junctions", t_junctions),
     ("bricks in rows of three and four", bricks),
+    ("bricks whose T-junctions slivers close", || zipped(false)),
+    ("the same, inside out", || zipped(true)),
+    ("bricks with borders that rounding hides", hidden_borders),
+    ("crossing plates with slivers along their rims", plates),
     ("smooth sheet", smooth),
+    ("smooth sheet, stretched", stretched),
+    ("two sheets an ulp of f32 apart", two_layers),
     ("sphere of loose triangles, moved by f32's rounding", loose),
     ("fans of slivers", fans),
     ("bow ties", || thinned(sheet(), |k| (k / 2 + k / 2 / CELLS) % 2 == 0)),
@@ -185,6 +191,90 @@ fn bricks() -> WorldMesh {
             all.triangles.extend([[0, 1, 2], [0, 2, 3]].map(|t| t.map(|i| first + i)));
         }
     }
+    all
+}
+
+/// Bricks, with a triangle of no width for each corner that lies on another brick's edge.
+fn zipped(inside_out: bool) -> WorldMesh {
+    let mut all = bricks();
+    let corners = all.positions.clone();
+    for brick in 0..corners.len() as u32 / 4 {
+        for (from, to) in [(0, 3), (1, 2)].map(|(a, b)| (4 * brick + a, 4 * brick + b)) {
+            let (a, b) = (corners[from as usize], corners[to as usize]);
+            let inside = |p: &DVec3| {
+                let share = (*p - a).dot(b - a) / (b - a).length_squared();
+                (0.01..0.99).contains(&share) && (a.lerp(b, share)).distance(*p) < 1e-9
+            };
+            let on_edge = (0..corners.len() as u32).filter(|i| inside(&corners[*i as usize]));
+            all.triangles.extend(on_edge.map(|i| [from, i, to]));
+        }
+    }
+    if inside_out {
+        all.triangles.iter_mut().for_each(|t| t.swap(1, 2));
+    }
+    all
+}
+
+/// Eight squares through one another, with twelve vertices on each side, which ears of no width cut off: by rounding such an
+/// ear seems to lie before what is in front of it.
+fn plates() -> WorldMesh {
+    const ON_SIDE: u32 = 12;
+    let mut all = empty();
+    let mut rng = suite::rng(63, 3 << 32);
+    for _ in 0..8 {
+        let normal = shapes::direction(&mut rng);
+        let across = normal.any_orthonormal_vector();
+        let (x, y) = (across * 0.8, normal.cross(across) * 0.8);
+        let corners = [-x - y, x - y, x + y, -x + y];
+        let first = all.positions.len() as u32;
+        let on_side = |k: usize, i: u32| {
+            corners[k].lerp(corners[(k + 1) % 4], f64::from(i) / f64::from(ON_SIDE))
+        };
+        let rim = (0..4).flat_map(|k| (0..ON_SIDE).map(move |i| on_side(k, i)));
+        all.positions.extend(rim);
+        let corner = |k: u32| first + k % 4 * ON_SIDE;
+        all.triangles.extend([[0, 1, 2], [0, 2, 3]].map(|t| t.map(corner)));
+        for k in 0..4 {
+            let end = |i: u32| if i == ON_SIDE { corner(k + 1) } else { corner(k) + i };
+            all.triangles.extend((1..ON_SIDE).map(|i| [corner(k), end(i), end(i + 1)]));
+        }
+    }
+    all
+}
+
+/// Bricks whose outer edges have a further triangle each, so slim that rounding makes it a line.
+fn hidden_borders() -> WorldMesh {
+    let mut all = bricks();
+    let edges = all.triangles.clone();
+    for [a, b, c] in edges {
+        for (from, to) in [(a, b), (b, c), (c, a)] {
+            let [p, q] = [from, to].map(|i| all.positions[i as usize]);
+            if p.y == q.y && (p.y == 0.0 || p.y == 1.0) {
+                all.triangles.push([to, from, all.positions.len() as u32]);
+                all.positions.push(p + DVec3::Y * 1e-11 * if p.y == 0.0 { -1.0 } else { 1.0 });
+            }
+        }
+    }
+    all
+}
+
+/// Its triangles are ten thousand times as long as they are wide.
+fn stretched() -> WorldMesh {
+    let mut all = smooth();
+    all.positions.iter_mut().for_each(|p| p.x *= 1e4);
+    all
+}
+
+/// A sheet and, off it by less than rounding shows or a little more, another one that faces the other way.
+fn two_layers() -> WorldMesh {
+    let mut all = sheet();
+    let first = all.positions.len() as u32;
+    let mut rng = suite::rng(63, 2 << 32);
+    let moved = all.positions.clone().into_iter();
+    all.positions.extend(moved.map(|p| p + DVec3::Z * rng.random_range(-3e-8..3e-8)));
+    let other: Vec<[u32; 3]> =
+        all.triangles.iter().map(|t| t.map(|i| first + i)).map(|[a, b, c]| [a, c, b]).collect();
+    all.triangles.extend(other);
     all
 }
 

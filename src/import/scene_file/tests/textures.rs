@@ -10,6 +10,9 @@ fn textured(mesh: &str) -> Loaded {
     let at = |name: &str| folder.path().join(name);
     std::fs::write(at("white.ppm"), b"P6 1 1 255\n\xff\xff\xff").expect("written");
     std::fs::write(at("t.obj"), "v 0 0 0\nv 1 0 0\nv 0 0 1\nf 1 2 3\n").expect("written");
+    let part =
+        "v 0 0 0\nv 1 0 0\nv 0 0 1\nv 1 0 1\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\nf 2 4 3\n";
+    std::fs::write(at("part.obj"), part).expect("written");
     let text = format!(
         "sky.radiance = 1\n[material.paper]\ntexture = 'white.ppm'\n[[mesh]]\nmaterial = 'paper'\n{mesh}\n"
     );
@@ -114,6 +117,14 @@ fn a_mesh_without_texture_coordinates_is_named_with_its_material() {
     let [warning] = &loaded.warnings[..] else { panic!("{:?}", loaded.warnings) };
     assert!(warning.message.contains("`wing`") && warning.message.contains("`paper`"), "{warning}");
     assert_eq!(warning.line, Some(4));
+}
+
+#[test]
+fn a_mesh_with_coordinates_for_some_faces_alone_is_named() {
+    let loaded = textured("file = 'part.obj'\nname = 'wing'");
+    let [warning] = &loaded.warnings[..] else { panic!("{:?}", loaded.warnings) };
+    assert!(warning.message.starts_with("1 of 2 triangles of the mesh `wing` has no"), "{warning}");
+    assert!(warning.message.contains("`paper`"), "{warning}");
 }
 
 #[test]
