@@ -8,6 +8,7 @@
 
 mod class;
 mod differ;
+mod edge_on;
 mod judge;
 mod rays;
 mod tally;

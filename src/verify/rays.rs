@@ -1,7 +1,7 @@
 //! The rays: six kinds, each ray a function of seed, kind and index.
 
 use super::Check;
-use super::differ::{edge_noise, is_narrow};
+use super::edge_on::{edge_noise, is_narrow};
 use crate::intersect::{Hit, PrimRef, Ray, SurfaceInteraction};
 use crate::math::DVec3;
 use crate::sampling::mix;
