@@ -122,7 +122,7 @@ fn a_report_of_a_single_frame_says_so() {
 #[test]
 fn a_look_at_one_frame_of_a_move_is_complete() {
     let job = Job::new();
-    let line = "render scene.toml --size 24x16 --spp 1 -q -o o/look.png";
+    let line = "render cube.obj --size 24x16 --spp 1 -q -o o/look.png";
     job.done(&format!("{line} --frames 2"));
     for asked in ["o", "o/look.png", "o --frames 2"] {
         let ran = job.done(&format!("status {asked}"));

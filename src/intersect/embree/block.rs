@@ -80,8 +80,8 @@ impl EmbreeIntersector<'_> {
         }
         if self.retries() {
             for lane in each(displaced) {
-                let known = hits[lane].map_or_else(Known::default, Known::of);
-                hits[lane] = self.hit_before(&rays[lane], known, counts);
+                let before = |hit| self.hit_before(&rays[lane], Known::of(hit), counts);
+                hits[lane] = hits[lane].and_then(before);
             }
         }
     }
